@@ -1,0 +1,1 @@
+#include <hooke/io/motion.hpp>

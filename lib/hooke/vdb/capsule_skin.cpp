@@ -1,0 +1,1 @@
+#include <hooke/vdb/capsule_skin.hpp>
