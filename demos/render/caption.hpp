@@ -1,0 +1,16 @@
+// A few lines of text in the bottom left corner of a finished picture.
+#pragma once
+
+#include <render/image.hpp>
+
+#include <string>
+#include <vector>
+
+namespace hooke::render {
+
+/// Draws `lines` on a soft dark strip in the bottom left corner. The size follows the
+/// picture's height (26 lines of 720 pixels would fill it); lines that are too long are
+/// cut. The font holds ASCII 32 to 126; any other character shows as '?'. No lines, no strip.
+void draw_caption(Image& image, const std::vector<std::string>& lines);
+
+}  // namespace hooke::render

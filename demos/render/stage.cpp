@@ -1,0 +1,547 @@
+// A picture is made in these passes:
+//   1. depth maps of the models from the key light, the rim light and each direction of the
+//      dome that stands for light from all around;
+//   2. a prepass, one sample a pixel: how far each pixel is and how it faces;
+//   3. visibility: from 1 and 2, how much of each light every pixel sees; then a blur;
+//   4. the lit picture, four samples a pixel, in linear light;
+//   5. development: tone curve, averaging, vignette and dither, down to 8 bits.
+// Nothing is random and nothing is kept between pictures except uploaded connectivity.
+#include <render/stage.hpp>
+
+#include <render/caption.hpp>
+#include <render/context.hpp>
+#include <render/shaders.hpp>
+#include <render/surface.hpp>
+
+#include <Eigen/Geometry>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <optional>
+#include <stdexcept>
+#include <string>
+
+namespace hooke::render {
+
+namespace {
+
+using Eigen::Matrix4f;
+using Eigen::Vector3f;
+
+constexpr int kSamples = 4;
+constexpr int kKeyMap = 2048, kRimMap = 1024, kDomeTile = 256;
+constexpr int kDomeRows = kDomeDirections / kDomeColumns;
+static_assert(kDomeRows * kDomeColumns == kDomeDirections);
+
+struct Box {
+  Vec3 lower{-0.5, 0, -0.5}, upper{0.5, 1, 0.5};
+  Vec3 middle() const { return 0.5 * (lower + upper); }
+  double radius() const { return 0.5 * (upper - lower).norm(); }
+};
+
+// A parallel light's view of a box: what it looks through, and half the size of that [m].
+struct LightView {
+  Matrix4f to_clip;
+  Vec3 half_size;
+};
+
+Vec3 any_right_angle(const Vec3& direction) {
+  const Vec3 helper = std::abs(direction.y()) < 0.95 ? Vec3(0, 1, 0) : Vec3(0, 0, 1);
+  return helper.cross(direction).normalized();
+}
+
+// Sizes grow in steps and positions move by whole texels, so a moving subject does not
+// make its shadow's edge shimmer.
+LightView light_view(const Box& box, const Vec3& direction, int texels) {
+  const Vec3 right = any_right_angle(direction), up = direction.cross(right);
+  const Vec3 half_box = 0.5 * (box.upper - box.lower), middle = box.middle();
+  const Vec3 axes[3] = {right, up, -direction};
+  const double step = std::exp2(std::floor(std::log2(std::max(1e-3, box.radius())))) / 8;
+  LightView view;
+  view.to_clip.setIdentity();
+  for (int k = 0; k < 3; ++k) {
+    const double needed = half_box.dot(axes[k].cwiseAbs()) * 1.04 + 0.02;
+    const double half = step * std::ceil(needed / step);
+    const double texel = 2 * half / texels;
+    const double at = texel * std::round(axes[k].dot(middle) / texel);
+    view.half_size[k] = half;
+    view.to_clip.row(k) << (axes[k] / half).transpose().cast<float>(), static_cast<float>(-at / half);
+  }
+  return view;
+}
+
+// Even over the sphere: equal steps in height, golden-angle turns. The first come from above.
+std::vector<Vec3> dome_directions() {
+  const double golden = std::numbers::pi * (3 - std::sqrt(5.0));
+  std::vector<Vec3> directions;
+  for (int k = 0; k < kDomeDirections; ++k) {
+    const bool above = k < kDomeUpward;
+    const double y = above ? (k + 0.5) / kDomeUpward : -(k - kDomeUpward + 0.5) / (kDomeDirections - kDomeUpward);
+    const double r = std::sqrt(1 - y * y), angle = golden * k + 0.4;
+    directions.emplace_back(r * std::cos(angle), y, r * std::sin(angle));
+  }
+  return directions;
+}
+
+struct View {
+  Vec3 forward, ray_right, ray_up;
+  Matrix4f to_clip;
+};
+
+View view_of(const Camera& camera, double aspect, double far_away) {
+  const double fov = camera.vertical_fov_degrees;
+  if (!(fov > 0 && fov < 180))
+    throw std::invalid_argument("Stage: the field of view must be in (0, 180) degrees, got " + std::to_string(fov));
+  const Vec3 sight = camera.target - camera.eye, across = sight.cross(camera.up);
+  if (!camera.eye.allFinite() || !(sight.norm() > 1e-9) || !(across.norm() > 1e-9 * sight.norm() * camera.up.norm()))
+    throw std::invalid_argument("Stage: the camera needs a finite eye, another target, and up not along the sight");
+  View view;
+  view.forward = sight.normalized();
+  const Vec3 right = across.normalized(), up = right.cross(view.forward);
+  const double tan_v = std::tan(fov * std::numbers::pi / 360);
+  view.ray_right = right * tan_v * aspect;
+  view.ray_up = up * tan_v;
+
+  const double near = std::clamp(0.02 * sight.norm(), 0.005, 0.1), far = far_away;
+  Eigen::Matrix4d look = Eigen::Matrix4d::Identity(), lens = Eigen::Matrix4d::Zero();
+  look.row(0) << right.transpose(), -right.dot(camera.eye);
+  look.row(1) << up.transpose(), -up.dot(camera.eye);
+  look.row(2) << -view.forward.transpose(), view.forward.dot(camera.eye);
+  lens(0, 0) = 1 / (tan_v * aspect);
+  lens(1, 1) = 1 / tan_v;
+  lens(2, 2) = -(far + near) / (far - near);
+  lens(2, 3) = -2 * far * near / (far - near);
+  lens(3, 2) = -1;
+  view.to_clip = (lens * look).cast<float>();
+  return view;
+}
+
+// One mesh on the graphics side; connectivity goes up once.
+struct Uploaded {
+  std::optional<Surface> surface;
+  GLuint array = 0, vertices = 0, indices = 0;
+
+  void make() {
+    glGenVertexArrays(1, &array);
+    glGenBuffers(1, &vertices);
+    glGenBuffers(1, &indices);
+    glBindVertexArray(array);
+    glBindBuffer(GL_ARRAY_BUFFER, vertices);
+    glBindBuffer(GL_ELEMENT_ARRAY_BUFFER, indices);
+    const int sizes[4] = {3, 3, 2, 2};
+    std::size_t offset = 0;
+    for (GLuint k = 0; k < 4; ++k) {
+      glEnableVertexAttribArray(k);
+      glVertexAttribPointer(k, sizes[k], GL_FLOAT, GL_FALSE, sizeof(SurfaceVertex), reinterpret_cast<void*>(offset));
+      offset += sizeof(float) * static_cast<std::size_t>(sizes[k]);
+    }
+  }
+
+  void upload(const Model& model) {
+    if (!array) make();
+    glBindVertexArray(array);
+    if (!surface || !surface->fits(model)) {
+      surface.reset();
+      surface.emplace(model);
+      const auto& list = surface->indices();
+      glBufferData(GL_ELEMENT_ARRAY_BUFFER, static_cast<GLsizeiptr>(list.size() * sizeof list[0]), list.data(),
+                   GL_STATIC_DRAW);
+    }
+    surface->update(model.mesh->vertices);
+    const auto& list = surface->vertices();
+    glBindBuffer(GL_ARRAY_BUFFER, vertices);
+    glBufferData(GL_ARRAY_BUFFER, static_cast<GLsizeiptr>(list.size() * sizeof list[0]), list.data(), GL_STREAM_DRAW);
+  }
+
+  void draw(std::size_t count) const {
+    glBindVertexArray(array);
+    glDrawElements(GL_TRIANGLES, static_cast<GLsizei>(count), GL_UNSIGNED_INT, nullptr);
+  }
+};
+
+void require_drawable(const Model& model) {
+  const auto share = [](const Vec3& c) { return c.allFinite() && (c.array() >= 0).all() && (c.array() <= 1).all(); };
+  const Material& m = model.material;
+  if (!model.mesh) throw std::invalid_argument("it has no mesh");
+  if (!share(m.color) || !share(m.inside_color) || !share(m.sheen))
+    throw std::invalid_argument("colours must be in [0, 1]");
+  if (!(m.roughness > 0 && m.roughness <= 1))
+    throw std::invalid_argument("roughness must be in (0, 1], got " + std::to_string(m.roughness));
+  if (!(m.weave >= 0) || !(model.thickness >= 0) || !std::isfinite(m.weave) || !std::isfinite(model.thickness))
+    throw std::invalid_argument("weave and thickness must not be negative");
+  if (model.subdivisions < 0 || model.subdivisions > 2)
+    throw std::invalid_argument("subdivisions must be 0 to 2, got " + std::to_string(model.subdivisions));
+}
+
+void require_look(const Look& look) {
+  if (!look.key_direction.allFinite() || !look.rim_direction.allFinite() || look.key_direction.norm() < 1e-9 ||
+      look.rim_direction.norm() < 1e-9 || !(look.key_size >= 0 && look.key_size < 2))
+    throw std::invalid_argument("Stage: light directions must be finite and not zero, key_size in [0, 2)");
+}
+
+}  // namespace
+
+Look look_for(const Camera& camera) {
+  Look look;
+  const Vec3 sight = camera.target - camera.eye;
+  const double turn = std::atan2(-sight.x(), -sight.z());  // 0 for a camera on the +z side
+  const Eigen::AngleAxisd about_up(turn, Vec3::UnitY());
+  look.key_direction = about_up * look.key_direction;
+  look.rim_direction = about_up * look.rim_direction;
+  return look;
+}
+
+struct Stage::Studio {
+  Studio(int width_, int height_, int supersample_, const Look& look_);
+  void make_floor();
+  void make_targets();
+  Box upload(std::span<const Model> models);
+  void draw_depth_maps(std::span<const Model> models, const Box& box);
+  template <class Draw>
+  void draw_models(gl::Program& program, std::span<const Model> models, const Draw& before_each);
+  void draw_floor(gl::Program& program, const View& view);
+  void draw_prepass(std::span<const Model> models, const Camera& camera, const View& view);
+  void draw_visibility(const Camera& camera, const View& view, const Box& box);
+  void draw_lit(std::span<const Model> models, const Camera& camera, const View& view);
+  Image develop();
+  void set_pixels(gl::Program& program, const Camera& camera, const View& view);
+  Image draw(std::span<const Model> models, const Camera& camera);
+
+  int width, height, supersample;
+  Look look;
+  gl::Context context;
+  gl::Program depth, prepass, floor_prepass, visibility, blur, lit, floor_lit, developer;
+  GLuint empty_array = 0, floor_array = 0;
+  GLsizei floor_count = 0;
+  GLuint key_map = 0, rim_map = 0, dome_map = 0, key_target = 0, rim_target = 0, dome_target = 0;
+  GLuint normal_depth = 0, prepass_target = 0;
+  GLuint visible[2] = {0, 0}, visible_target[2] = {0, 0};
+  GLuint light = 0, light_target = 0, finished_target = 0;
+  GLuint compare_sampler = 0;
+  std::vector<Uploaded> uploaded;
+  std::vector<Vec3> dome = dome_directions();
+  LightView key_view, rim_view;
+  std::vector<Matrix4f> dome_views;
+  double dome_reach = 1;
+  Vec3 floor_center{0, 0, 0};
+  double floor_radius = 8;
+
+  int drawn_width() const { return width * supersample; }
+  int drawn_height() const { return height * supersample; }
+};
+
+Stage::Studio::Studio(int width_, int height_, int supersample_, const Look& look_)
+    : width(width_), height(height_), supersample(supersample_), look(look_) {
+  const gl::Context::Current current(context);
+  depth = gl::Program("depth", depth_vertex_shader(), depth_fragment_shader());
+  prepass = gl::Program("prepass", surface_vertex_shader(), prepass_fragment_shader());
+  floor_prepass = gl::Program("floor prepass", floor_vertex_shader(), prepass_fragment_shader());
+  visibility = gl::Program("visibility", full_screen_vertex_shader(), visibility_fragment_shader());
+  blur = gl::Program("blur", full_screen_vertex_shader(), blur_fragment_shader());
+  lit = gl::Program("lit", surface_vertex_shader(), lit_fragment_shader());
+  floor_lit = gl::Program("lit floor", floor_vertex_shader(), lit_fragment_shader());
+  developer = gl::Program("develop", full_screen_vertex_shader(), develop_fragment_shader());
+  make_floor();
+  make_targets();
+  gl::check("the studio's construction");
+}
+
+// Rings of the floor's profile: flat, the quarter circle, and the wall.
+void Stage::Studio::make_floor() {
+  constexpr int around = 96;
+  std::vector<float> rings = {0, 0.25f, 0.5f, 0.75f};
+  for (int k = 0; k <= 24; ++k) rings.push_back(1 + 1.42f * static_cast<float>(k) / 24);
+  rings.push_back(6);
+  std::vector<float> points;
+  for (const float ring : rings)
+    for (int k = 0; k < around; ++k) {
+      const double angle = 2 * std::numbers::pi * k / around;
+      for (const float value : {static_cast<float>(std::cos(angle)), static_cast<float>(std::sin(angle)), ring})
+        points.push_back(value);
+    }
+  std::vector<std::uint32_t> indices;
+  for (std::uint32_t ring = 0; ring + 1 < rings.size(); ++ring)
+    for (std::uint32_t k = 0; k < around; ++k) {
+      const std::uint32_t a = ring * around + k, b = ring * around + (k + 1) % around;
+      for (const std::uint32_t i : {a, b, a + around, b, b + around, a + around}) indices.push_back(i);
+    }
+  floor_count = static_cast<GLsizei>(indices.size());
+  GLuint buffers[2];
+  glGenVertexArrays(1, &empty_array);
+  glGenVertexArrays(1, &floor_array);
+  glGenBuffers(2, buffers);
+  glBindVertexArray(floor_array);
+  glBindBuffer(GL_ARRAY_BUFFER, buffers[0]);
+  glBufferData(GL_ARRAY_BUFFER, static_cast<GLsizeiptr>(points.size() * sizeof points[0]), points.data(),
+               GL_STATIC_DRAW);
+  glBindBuffer(GL_ELEMENT_ARRAY_BUFFER, buffers[1]);
+  glBufferData(GL_ELEMENT_ARRAY_BUFFER, static_cast<GLsizeiptr>(indices.size() * sizeof indices[0]), indices.data(),
+               GL_STATIC_DRAW);
+  glEnableVertexAttribArray(0);
+  glVertexAttribPointer(0, 3, GL_FLOAT, GL_FALSE, 0, nullptr);
+}
+
+void Stage::Studio::make_targets() {
+  const int w = drawn_width(), h = drawn_height();
+  key_map = gl::make_depth_map(kKeyMap, kKeyMap);
+  rim_map = gl::make_depth_map(kRimMap, kRimMap);
+  dome_map = gl::make_depth_map(kDomeTile * kDomeColumns, kDomeTile * kDomeRows);
+  key_target = gl::make_framebuffer(GL_TEXTURE_2D, 0, key_map);
+  rim_target = gl::make_framebuffer(GL_TEXTURE_2D, 0, rim_map);
+  dome_target = gl::make_framebuffer(GL_TEXTURE_2D, 0, dome_map);
+  normal_depth = gl::make_texture(GL_RGBA32F, w, h, GL_NEAREST);
+  const GLuint prepass_depth = gl::make_texture(GL_DEPTH_COMPONENT32F, w, h, GL_NEAREST);
+  prepass_target = gl::make_framebuffer(GL_TEXTURE_2D, normal_depth, prepass_depth);
+  for (int k = 0; k < 2; ++k) {
+    visible[k] = gl::make_texture(GL_RGBA16F, w, h, GL_NEAREST);
+    visible_target[k] = gl::make_framebuffer(GL_TEXTURE_2D, visible[k], 0);
+  }
+  light = gl::make_texture(GL_RGBA16F, w, h, GL_NEAREST, kSamples);
+  const GLuint light_depth = gl::make_texture(GL_DEPTH_COMPONENT32F, w, h, GL_NEAREST, kSamples);
+  light_target = gl::make_framebuffer(GL_TEXTURE_2D_MULTISAMPLE, light, light_depth);
+  finished_target =
+      gl::make_framebuffer(GL_TEXTURE_2D, gl::make_texture(GL_RGBA8, width, height, GL_NEAREST), 0);
+
+  glGenSamplers(1, &compare_sampler);
+  for (const GLenum which : {GL_TEXTURE_MIN_FILTER, GL_TEXTURE_MAG_FILTER})
+    glSamplerParameteri(compare_sampler, which, GL_LINEAR);
+  for (const GLenum which : {GL_TEXTURE_WRAP_S, GL_TEXTURE_WRAP_T})
+    glSamplerParameteri(compare_sampler, which, GL_CLAMP_TO_EDGE);
+  glSamplerParameteri(compare_sampler, GL_TEXTURE_COMPARE_MODE, GL_COMPARE_REF_TO_TEXTURE);
+  glSamplerParameteri(compare_sampler, GL_TEXTURE_COMPARE_FUNC, GL_LEQUAL);
+}
+
+Box Stage::Studio::upload(std::span<const Model> models) {
+  if (uploaded.size() < models.size()) uploaded.resize(models.size());
+  std::optional<Box> box;
+  for (std::size_t i = 0; i < models.size(); ++i) {
+    try {
+      require_drawable(models[i]);
+      uploaded[i].upload(models[i]);
+    } catch (const std::invalid_argument& error) {
+      throw std::invalid_argument("Stage: model " + std::to_string(i) + ": " + error.what());
+    }
+    const Surface& surface = *uploaded[i].surface;
+    if (surface.vertices().empty()) continue;
+    if (!box) box = Box{surface.lower(), surface.upper()};
+    box->lower = box->lower.cwiseMin(surface.lower());
+    box->upper = box->upper.cwiseMax(surface.upper());
+  }
+  return box.value_or(Box{});
+}
+
+void Stage::Studio::draw_depth_maps(std::span<const Model> models, const Box& box) {
+  const auto draw_into = [&](const Matrix4f& to_clip) {
+    depth.set("to_clip", to_clip);
+    for (std::size_t i = 0; i < models.size(); ++i) uploaded[i].draw(uploaded[i].surface->sheet_index_count());
+  };
+  depth.use();
+  const Vec3 key_direction = look.key_direction.normalized(), rim_direction = look.rim_direction.normalized();
+  key_view = light_view(box, key_direction, kKeyMap);
+  rim_view = light_view(box, rim_direction, kRimMap);
+  glBindFramebuffer(GL_FRAMEBUFFER, key_target);
+  glViewport(0, 0, kKeyMap, kKeyMap);
+  glClear(GL_DEPTH_BUFFER_BIT);
+  draw_into(key_view.to_clip);
+  glBindFramebuffer(GL_FRAMEBUFFER, rim_target);
+  glViewport(0, 0, kRimMap, kRimMap);
+  glClear(GL_DEPTH_BUFFER_BIT);
+  draw_into(rim_view.to_clip);
+
+  glBindFramebuffer(GL_FRAMEBUFFER, dome_target);
+  glClear(GL_DEPTH_BUFFER_BIT);
+  dome_views.clear();
+  dome_reach = 0;
+  for (int k = 0; k < kDomeDirections; ++k) {
+    const LightView view = light_view(box, dome[static_cast<std::size_t>(k)], kDomeTile);
+    dome_reach = std::max({dome_reach, view.half_size.x(), view.half_size.y()});
+    glViewport(kDomeTile * (k % kDomeColumns), kDomeTile * (k / kDomeColumns), kDomeTile, kDomeTile);
+    draw_into(view.to_clip);
+    dome_views.push_back(view.to_clip);
+  }
+}
+
+template <class Draw>
+void Stage::Studio::draw_models(gl::Program& program, std::span<const Model> models, const Draw& before_each) {
+  program.use();
+  for (std::size_t i = 0; i < models.size(); ++i) {
+    program.set("two_sided", models[i].thickness > 0 ? 0 : 1);
+    before_each(models[i]);
+    uploaded[i].draw(uploaded[i].surface->indices().size());
+  }
+}
+
+void Stage::Studio::draw_floor(gl::Program& program, const View& view) {
+  program.set("to_clip", view.to_clip);
+  program.set("floor_center", floor_center);
+  program.set("floor_radius", floor_radius);
+  glBindVertexArray(floor_array);
+  glDrawElements(GL_TRIANGLES, floor_count, GL_UNSIGNED_INT, nullptr);
+}
+
+void Stage::Studio::draw_prepass(std::span<const Model> models, const Camera& camera, const View& view) {
+  glBindFramebuffer(GL_FRAMEBUFFER, prepass_target);
+  glViewport(0, 0, drawn_width(), drawn_height());
+  glClear(GL_DEPTH_BUFFER_BIT | GL_COLOR_BUFFER_BIT);
+  for (gl::Program* program : {&prepass, &floor_prepass}) {
+    program->use();
+    program->set("eye", camera.eye);
+    program->set("forward", view.forward);
+    program->set("to_clip", view.to_clip);
+    program->set("two_sided", 0);
+  }
+  draw_models(prepass, models, [](const Model&) {});
+  floor_prepass.use();
+  draw_floor(floor_prepass, view);
+}
+
+void Stage::Studio::set_pixels(gl::Program& program, const Camera& camera, const View& view) {
+  program.set("eye", camera.eye);
+  program.set("forward", view.forward);
+  program.set("ray_right", view.ray_right);
+  program.set("ray_up", view.ray_up);
+  program.set("picture", Eigen::Vector2f(static_cast<float>(drawn_width()), static_cast<float>(drawn_height())));
+  program.set_texture("normal_depth", 0, GL_TEXTURE_2D, normal_depth);
+}
+
+void Stage::Studio::draw_visibility(const Camera& camera, const View& view, const Box& box) {
+  glBindVertexArray(empty_array);
+  glDisable(GL_DEPTH_TEST);
+  glBindFramebuffer(GL_FRAMEBUFFER, visible_target[0]);
+  visibility.use();
+  set_pixels(visibility, camera, view);
+  visibility.set_texture("key_depth", 1, GL_TEXTURE_2D, key_map);
+  visibility.set_texture("key_shadow", 2, GL_TEXTURE_2D, key_map);
+  visibility.set_texture("rim_shadow", 3, GL_TEXTURE_2D, rim_map);
+  visibility.set_texture("dome_shadow", 4, GL_TEXTURE_2D, dome_map);
+  for (GLuint unit = 2; unit <= 4; ++unit) glBindSampler(unit, compare_sampler);
+  visibility.set("to_key", key_view.to_clip);
+  visibility.set("to_rim", rim_view.to_clip);
+  visibility.set("to_dome", dome_views);
+  visibility.set("key_direction", Vec3(look.key_direction.normalized()));
+  visibility.set("rim_direction", Vec3(look.rim_direction.normalized()));
+  std::vector<Vector3f> directions;
+  for (const Vec3& direction : dome) directions.push_back(direction.cast<float>());
+  visibility.set("dome_direction", directions);
+  visibility.set("key_extent", key_view.half_size);
+  visibility.set("rim_extent", rim_view.half_size);
+  visibility.set("dome_reach", dome_reach);
+  visibility.set("key_tan", std::tan(0.5 * look.key_size));
+  visibility.set("subject", box.middle());
+  visibility.set("subject_radius", box.radius());
+  glDrawArrays(GL_TRIANGLES, 0, 3);
+  for (GLuint unit = 2; unit <= 4; ++unit) glBindSampler(unit, 0);
+
+  blur.use();
+  set_pixels(blur, camera, view);
+  for (int k = 0; k < 2; ++k) {
+    glBindFramebuffer(GL_FRAMEBUFFER, visible_target[1 - k]);
+    blur.set_texture("visible", 1, GL_TEXTURE_2D, visible[k]);
+    blur.set("along", Eigen::Vector2f(k == 0 ? 1.f : 0.f, k == 0 ? 0.f : 1.f));
+    glDrawArrays(GL_TRIANGLES, 0, 3);
+  }
+  glEnable(GL_DEPTH_TEST);
+}
+
+void Stage::Studio::draw_lit(std::span<const Model> models, const Camera& camera, const View& view) {
+  glBindFramebuffer(GL_FRAMEBUFFER, light_target);
+  glClear(GL_DEPTH_BUFFER_BIT | GL_COLOR_BUFFER_BIT);
+  for (gl::Program* program : {&lit, &floor_lit}) {
+    program->use();
+    set_pixels(*program, camera, view);
+    program->set_texture("visible", 1, GL_TEXTURE_2D, visible[0]);
+    program->set("to_clip", view.to_clip);
+    program->set("key_direction", Vec3(look.key_direction.normalized()));
+    program->set("rim_direction", Vec3(look.rim_direction.normalized()));
+    program->set("key_color", Vec3(look.key_intensity * Vec3(1.62, 1.53, 1.40)));
+    program->set("rim_color", Vec3(look.rim_intensity * Vec3(1.05, 1.28, 1.60)));
+    program->set("sky_color", Vec3(look.fill_intensity * Vec3(0.60, 0.65, 0.72)));
+    program->set("ground_color", Vec3(look.fill_intensity * Vec3(1.15, 1.10, 1.05)));
+    program->set("floor_color", look.floor_color);
+    program->set("floor_center", floor_center);
+    program->set("floor_radius", floor_radius);
+    program->set("two_sided", 0);
+    program->set("kind", 0);
+  }
+  draw_models(lit, models, [this](const Model& model) {
+    const Material& m = model.material;
+    lit.set("kind", m.kind == Material::Kind::Cloth ? 2 : 1);
+    lit.set("outside_color", m.color);
+    lit.set("inside_color", m.inside_color);
+    lit.set("sheen_color", m.sheen);
+    lit.set("roughness", m.roughness);
+    lit.set("weave", model.uv ? m.weave : 0.0);
+  });
+  floor_lit.use();
+  draw_floor(floor_lit, view);
+}
+
+Image Stage::Studio::develop() {
+  glBindVertexArray(empty_array);
+  glDisable(GL_DEPTH_TEST);
+  glBindFramebuffer(GL_FRAMEBUFFER, finished_target);
+  glViewport(0, 0, width, height);
+  developer.use();
+  developer.set_texture("picture_light", 0, GL_TEXTURE_2D_MULTISAMPLE, light);
+  developer.set("supersample", supersample);
+  developer.set("samples", kSamples);
+  developer.set("exposure", look.exposure);
+  glDrawArrays(GL_TRIANGLES, 0, 3);
+  glEnable(GL_DEPTH_TEST);
+
+  Image image{width, height, {}};
+  const std::size_t row = 3 * static_cast<std::size_t>(width);
+  image.rgb.resize(row * static_cast<std::size_t>(height));
+  glPixelStorei(GL_PACK_ALIGNMENT, 1);
+  glReadPixels(0, 0, width, height, GL_RGB, GL_UNSIGNED_BYTE, image.rgb.data());
+  for (int y = 0; y < height / 2; ++y)  // OpenGL's first row is the bottom
+    std::swap_ranges(image.at(0, y), image.at(0, y) + row, image.at(0, height - 1 - y));
+  return image;
+}
+
+Image Stage::Studio::draw(std::span<const Model> models, const Camera& camera) {
+  const gl::Context::Current current(context);
+  glEnable(GL_DEPTH_TEST);
+  glEnable(GL_MULTISAMPLE);
+  // The floor follows what the camera looks at and is always wider than the camera is far.
+  floor_center = Vec3(camera.target.x(), 0, camera.target.z());
+  const Vec3 away = camera.eye - floor_center;
+  floor_radius = std::max(8.0, 1.3 * std::hypot(away.x(), away.z()));
+  const View view = view_of(camera, static_cast<double>(width) / height, 12 * floor_radius + away.norm());
+
+  const Box box = upload(models);
+  draw_depth_maps(models, box);
+  draw_prepass(models, camera, view);
+  draw_visibility(camera, view, box);
+  draw_lit(models, camera, view);
+  Image image = develop();
+  gl::check("draw");
+  return image;
+}
+
+Stage::Stage(int width, int height, int supersample, const Look& look) {
+  if (width < 1 || height < 1 || width > 8192 || height > 8192 || supersample < 1 || supersample > 4)
+    throw std::invalid_argument("Stage: width and height must be 1 to 8192 and supersample 1 to 4, got " +
+                                std::to_string(width) + " x " + std::to_string(height) + ", " +
+                                std::to_string(supersample));
+  require_look(look);
+  studio_ = std::make_unique<Studio>(width, height, supersample, look);
+}
+
+Stage::~Stage() = default;
+Stage::Stage(Stage&&) noexcept = default;
+Stage& Stage::operator=(Stage&&) noexcept = default;
+
+void Stage::set_look(const Look& look) {
+  require_look(look);
+  studio_->look = look;
+}
+
+Image Stage::draw(std::span<const Model> models, const Camera& camera, const std::vector<std::string>& caption_lines) {
+  Image image = studio_->draw(models, camera);
+  draw_caption(image, caption_lines);
+  return image;
+}
+
+}  // namespace hooke::render
