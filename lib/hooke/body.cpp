@@ -1,0 +1,47 @@
+#include <hooke/body.hpp>
+
+#include <stdexcept>
+
+namespace hooke {
+
+namespace {
+
+void check_index(Index point, Index size) {
+  if (point < 0 || point >= size)
+    throw std::out_of_range("point " + std::to_string(point) + " of " + std::to_string(size));
+}
+
+Vec3 row(const Points<double>& p, Index i) { return p.row(i).matrix().transpose(); }
+
+}  // namespace
+
+std::string StepReport::text() const {
+  if (good()) return "good";
+  std::string what = status == Status::NotFinite ? "became infinite or NaN" : "the implicit solve did not converge";
+  std::string where = "body \"" + body + "\"" + (point >= 0 ? ", point " + std::to_string(point) : "");
+  return where + ": " + what + " after " + std::to_string(time) + " s; " + advice;
+}
+
+Vec3 Body::displacement(Index point) const {
+  check_index(point, size());
+  return row(positions(), point) - row(start_positions(), point);
+}
+
+Vec3 Body::displacement() const {
+  const Values<double> mass = masses();
+  if (mass.size() == 0) return Vec3::Zero();
+  const Points<double> moved = positions() - start_positions();
+  return (moved.colwise() * mass).colwise().sum().matrix().transpose() / mass.sum();
+}
+
+double Body::speed(Index point) const {
+  check_index(point, size());
+  return row(velocities(), point).norm();
+}
+
+double Body::weight(Index point, const Vec3& gravity) const {
+  check_index(point, size());
+  return masses()[point] * gravity.norm();
+}
+
+}  // namespace hooke

@@ -1,0 +1,277 @@
+#include <hooke/contacts.hpp>
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace hooke {
+
+namespace {
+
+// How far a point may stray from what its speed says within a tick before its candidates are
+// looked up again [m].
+constexpr double kSlack = 5e-3;
+
+template <class S>
+Eigen::Matrix<S, 3, 1> row(const Points<S>& p, Index i) {
+  return {p(i, 0), p(i, 1), p(i, 2)};
+}
+
+template <class S>
+void set_row(Points<S>& p, Index i, const Eigen::Matrix<S, 3, 1>& value) {
+  for (int k = 0; k < 3; ++k) p(i, k) = value[k];
+}
+
+// First root in [0, 1] of |d + s m|² = r², or infinity. `d` starts outside.
+template <class S>
+S sphere_entry(const Eigen::Matrix<S, 3, 1>& d, const Eigen::Matrix<S, 3, 1>& m, S r) {
+  const S a = m.squaredNorm(), b = d.dot(m), c = d.squaredNorm() - r * r;
+  const S discriminant = b * b - a * c;
+  if (a == 0 || b >= 0 || discriminant < 0) return std::numeric_limits<S>::infinity();
+  const S s = c / (-b + std::sqrt(discriminant));
+  return s >= 0 && s <= 1 ? s : std::numeric_limits<S>::infinity();
+}
+
+}  // namespace
+
+template <class S>
+void Contacts<S>::place_solids(double t, std::vector<Solid>& out) {
+  out.clear();
+  for (const Collider& collider : colliders_) {
+    if (collider.distance) continue;
+    std::span<const Shape> shapes = collider.shapes;
+    if (collider.motion) {
+      shapes_ = collider.shapes;
+      collider.motion(t, shapes_);
+      shapes = shapes_;
+    }
+    for (const Shape& shape : shapes) {
+      Solid solid;
+      solid.friction = S(collider.friction);
+      solid.restitution = S(collider.restitution);
+      if (const auto* half = std::get_if<HalfSpace>(&shape)) {
+        solid.kind = Kind::HalfSpace;
+        solid.a = half->normal.cast<S>();
+        solid.radius = S(half->offset - half->normal.dot(origin_)) + thickness_;
+      } else if (const auto* sphere = std::get_if<Sphere>(&shape)) {
+        solid.kind = Kind::Sphere;
+        solid.a = solid.b = (sphere->center - origin_).cast<S>();
+        solid.radius = S(sphere->radius) + thickness_;
+      } else {
+        const auto& capsule = std::get<Capsule>(shape);
+        solid.kind = Kind::Capsule;
+        solid.a = (capsule.a - origin_).cast<S>();
+        solid.b = (capsule.b - origin_).cast<S>();
+        solid.radius = S(capsule.radius) + thickness_;
+      }
+      out.push_back(solid);
+    }
+  }
+}
+
+template <class S>
+void Contacts<S>::begin_tick(std::span<const Collider> colliders, const PointMasses<S>& points, double t0, double t1,
+                             double thickness) {
+  colliders_ = colliders;
+  origin_ = points.origin;
+  thickness_ = S(thickness);
+  tick_end_ = t1;
+  now_ = t0;
+  callbacks_.clear();
+  for (const Collider& collider : colliders)
+    if (collider.distance) callbacks_.push_back(&collider);
+  place_solids(t1, previous_);
+  place_solids(t0, solids_);
+  candidates_.clear();
+  if (points.size() == 0 || solids_.empty()) return;
+  solid_move_.resize(solids_.size());
+  for (std::size_t s = 0; s < solids_.size(); ++s) {
+    const Solid &before = solids_[s], &after = previous_[s];
+    // A quarter on top of the straight way covers the bend of the path within a tick.
+    const S way = std::max((after.a - before.a).norm(), (after.b - before.b).norm());
+    solid_move_[s] = before.kind == Kind::HalfSpace ? std::abs(after.radius - before.radius) : S(1.25) * way;
+  }
+  find_candidates(points.position, points.velocity, t1 - t0);
+}
+
+template <class S>
+void Contacts<S>::find_candidates(const Points<S>& x, const Points<S>& v, double seconds) {
+  start_ = x;
+  reach_ = (S(1.5) * S(seconds)) * (v.square().rowwise().sum().sqrt()) + S(kSlack);
+  candidates_.clear();
+  const Vec lower = x.colwise().minCoeff().matrix().transpose(), upper = x.colwise().maxCoeff().matrix().transpose();
+  const S farthest = reach_.maxCoeff();
+  for (std::size_t s = 0; s < solids_.size(); ++s) {
+    const Solid& solid = solids_[s];
+    const S near = solid.radius + farthest + solid_move_[s];
+    if (solid.kind == Kind::HalfSpace) {
+      gap_ = x.col(0) * solid.a[0] + x.col(1) * solid.a[1] + x.col(2) * solid.a[2] - solid.radius;
+    } else {
+      const Vec low = solid.a.cwiseMin(solid.b), high = solid.a.cwiseMax(solid.b);
+      if (((low.array() - near) > upper.array()).any() || ((high.array() + near) < lower.array()).any()) continue;
+      const Vec axis = solid.b - solid.a;
+      const S inverse = axis.squaredNorm() > 0 ? 1 / axis.squaredNorm() : S(0);
+      gap_ = (((x.col(0) - solid.a[0]) * axis[0] + (x.col(1) - solid.a[1]) * axis[1] +
+               (x.col(2) - solid.a[2]) * axis[2]) *
+              inverse)
+                 .max(S(0))
+                 .min(S(1));
+      gap_ = ((x.col(0) - solid.a[0] - gap_ * axis[0]).square() + (x.col(1) - solid.a[1] - gap_ * axis[1]).square() +
+              (x.col(2) - solid.a[2] - gap_ * axis[2]).square())
+                 .sqrt() -
+             solid.radius;
+    }
+    for (Index i = 0; i < x.rows(); ++i)
+      if (gap_[i] <= reach_[i] + solid_move_[s]) candidates_.push_back({int(i), int(s)});
+  }
+}
+
+template <class S>
+typename Contacts<S>::Surface Contacts<S>::surface(const Solid& solid, const Vec& x) const {
+  if (solid.kind == Kind::HalfSpace) return {solid.a.dot(x) - solid.radius, solid.a};
+  Vec away = x - solid.a;
+  if (solid.kind == Kind::Capsule) {
+    const Vec axis = solid.b - solid.a;
+    const S length2 = axis.squaredNorm();
+    if (length2 > 0) away -= std::clamp(away.dot(axis) / length2, S(0), S(1)) * axis;
+  }
+  const S distance = away.norm();
+  // On the axis every direction is as good as any other; up is at least the same each time.
+  const Vec normal = distance > 0 ? Vec(away / distance) : Vec(0, 1, 0);
+  return {distance - solid.radius, normal};
+}
+
+// Where a point at x is after the solid has moved and taken it along.
+template <class S>
+typename Contacts<S>::Vec Contacts<S>::carried(const Solid& before, const Solid& after, const Vec& x) {
+  if (before.kind == Kind::HalfSpace) return x + (after.radius - before.radius) * after.a;
+  if (before.kind == Kind::Sphere) return x + (after.a - before.a);
+  const Vec old_axis = before.b - before.a, new_axis = after.b - after.a;
+  const S old_length2 = old_axis.squaredNorm();
+  if (old_axis == new_axis || old_length2 == 0 || new_axis.squaredNorm() == 0) return x + (after.a - before.a);
+  const S along = (x - before.a).dot(old_axis) / old_length2;
+  const Vec offset = x - before.a - along * old_axis;
+  return after.a + along * new_axis + Eigen::Quaternion<S>::FromTwoVectors(old_axis, new_axis) * offset;
+}
+
+// Where the way from `from` (outside) to `to` first enters the solid.
+template <class S>
+bool Contacts<S>::entry(const Solid& solid, const Vec& from, const Vec& to, Vec& hit) const {
+  const Vec way = to - from;
+  S first = std::numeric_limits<S>::infinity();
+  if (solid.kind == Kind::HalfSpace) {
+    const S start = solid.a.dot(from) - solid.radius, end = solid.a.dot(to) - solid.radius;
+    if (start >= 0 && end < 0) first = start / (start - end);
+  } else {
+    first = std::min(sphere_entry<S>(from - solid.a, way, solid.radius),
+                     sphere_entry<S>(from - solid.b, way, solid.radius));
+    const Vec axis = solid.b - solid.a;
+    const S length2 = axis.squaredNorm();
+    if (length2 > 0) {
+      const Vec d = from - solid.a;
+      const Vec across = d - (d.dot(axis) / length2) * axis, sideways = way - (way.dot(axis) / length2) * axis;
+      const S s = sphere_entry<S>(across, sideways, solid.radius);
+      if (s <= 1) {
+        const S along = (d + s * way).dot(axis) / length2;
+        if (along >= 0 && along <= 1) first = std::min(first, s);
+      }
+    }
+  }
+  if (!(first <= 1)) return false;
+  hit = from + first * way;
+  return true;
+}
+
+// One candidate in one substep: x and v after a move that began at `from`.
+template <class S>
+void Contacts<S>::touch(const Solid& before, const Solid& after, const Vec& from, S move, S h, Vec& x, Vec& v) const {
+  Surface at = surface(after, x);
+  if (at.gap >= 0 && (x - from).norm() + move <= at.gap) return;  // cannot have been inside on the way
+  const Vec start = carried(before, after, from);
+  const S start_gap = surface(after, start).gap;
+  // Through, or so deep that the nearest surface may be the wrong one: go by where it went in.
+  Vec hit;
+  if (start_gap >= 0 && (at.gap >= 0 || at.gap < S(-0.25) * after.radius) && entry(after, start, x, hit)) {
+    const Vec normal = surface(after, hit).normal;
+    const S beyond = (x - hit).dot(normal);
+    at = {beyond, normal};
+  }
+  if (at.gap >= 0) return;
+  const Vec& n = at.normal;
+  // What starts outside ends outside; what starts inside leaves at no more than the push speed.
+  const S target = std::min(S(0), std::min(S(0), start_gap) + S(kPushSpeed) * h);
+  const S depth = std::max(S(0), target - at.gap);
+  const Vec way = x - start;
+  const Vec slide = way - way.dot(n) * n;
+  const S slid = slide.norm();
+  x += depth * n;
+  if (slid > 0) x -= std::min(S(1), after.friction * depth / slid) * slide;
+
+  const Vec solid_velocity = (start - from) / h;
+  Vec relative = v - solid_velocity;
+  const S approach = -relative.dot(n);
+  if (approach <= 0) return;
+  relative += approach * n;
+  const S sliding = relative.norm();
+  if (sliding > 0) relative *= std::max(S(0), 1 - after.friction * approach / sliding);
+  v = solid_velocity + relative + after.restitution * approach * n;
+}
+
+template <class S>
+void Contacts<S>::resolve(double t0, const Points<S>& from, double t1, const Values<S>& inverse_mass, Points<S>& x,
+                          Points<S>& v) {
+  if (t0 != now_) place_solids(t0, solids_);
+  std::swap(previous_, solids_);
+  place_solids(t1, solids_);
+  now_ = t1;
+  const S h = S(t1 - t0);
+  if (!solids_.empty()) {
+    // Somebody was thrown farther than a tick's bound: look again from where this substep began.
+    if (((x - start_).square().rowwise().sum().sqrt() > reach_).any()) {
+      std::swap(previous_, solids_);
+      find_candidates(from, (x - from) / h, std::max(tick_end_ - t0, t1 - t0));
+      std::swap(previous_, solids_);
+    }
+    int last = -1;
+    S move = 0;
+    for (const Candidate& candidate : candidates_) {
+      const Index i = candidate.point;
+      if (inverse_mass[i] == 0) continue;
+      const Solid &before = previous_[std::size_t(candidate.solid)], &after = solids_[std::size_t(candidate.solid)];
+      if (candidate.solid != last) {
+        last = candidate.solid;
+        move = before.kind == Kind::HalfSpace ? std::abs(after.radius - before.radius)
+                                              : std::max((after.a - before.a).norm(), (after.b - before.b).norm());
+      }
+      Vec place = row(x, i), velocity = row(v, i);
+      touch(before, after, row(from, i), move, h, place, velocity);
+      set_row(x, i, place);
+      set_row(v, i, velocity);
+    }
+  }
+  for (const Collider* collider : callbacks_) {
+    world_ = x.template cast<double>().rowwise() + origin_.transpose().array();
+    distance_.setConstant(x.rows(), std::numeric_limits<double>::infinity());
+    normal_.setZero(x.rows(), 3);
+    collider->distance(t1, world_, distance_, normal_);
+    Solid solid;  // a plane through the nearest surface point, for this point and moment
+    solid.kind = Kind::HalfSpace;
+    solid.friction = S(collider->friction);
+    solid.restitution = S(collider->restitution);
+    for (Index i = 0; i < x.rows(); ++i) {
+      if (inverse_mass[i] == 0 || !(distance_[i] < double(thickness_))) continue;
+      Vec place = row(x, i), velocity = row(v, i);
+      solid.a = normal_.row(i).matrix().transpose().template cast<S>();
+      solid.radius = solid.a.dot(place) - S(distance_[i]) + thickness_;
+      touch(solid, solid, row(from, i), S(0), h, place, velocity);
+      set_row(x, i, place);
+      set_row(v, i, velocity);
+    }
+  }
+}
+
+template class Contacts<float>;
+template class Contacts<double>;
+
+}  // namespace hooke

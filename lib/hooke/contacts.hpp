@@ -1,0 +1,78 @@
+// One-way contact of a body's points with prescribed colliders, inside the substeps.
+#pragma once
+
+#include <hooke/collider.hpp>
+#include <hooke/point_masses.hpp>
+
+namespace hooke {
+
+/// Keeps points at least `thickness` outside of the colliders' surfaces.
+///
+/// Candidates (point, shape) are found once a tick from swept bounds, and again in the
+/// rare tick in which a point outruns its bound. Within a substep the shape carries the
+/// point's start along, so a fast limb meets a slow cloth as a slow limb would; what passed
+/// through a shape within the substep is brought back to where it went in. The point is put
+/// on the surface, its normal velocity is removed (or reflected), and Coulomb friction acts
+/// on position and velocity alike, so that what sticks does not creep. A start inside is
+/// pushed out at a bounded speed. Cost: one distance a candidate and substep.
+template <class S>
+class Contacts {
+ public:
+  /// Finds candidates for the tick from t0 to t1. `colliders` must stay where it is until the next call.
+  void begin_tick(std::span<const Collider> colliders, const PointMasses<S>& points, double t0, double t1,
+                  double thickness);
+
+  /// True where anything may touch in this tick.
+  bool any() const { return !candidates_.empty() || !callbacks_.empty(); }
+
+  /// Resolves contacts after a move from `from` at t0 to x at t1.
+  void resolve(double t0, const Points<S>& from, double t1, const Values<S>& inverse_mass, Points<S>& x,
+               Points<S>& v);
+
+  /// Speed at which points that start inside a solid are pushed out [m/s].
+  static constexpr double kPushSpeed = 2;
+
+ private:
+  using Vec = Eigen::Matrix<S, 3, 1>;
+  enum class Kind { HalfSpace, Sphere, Capsule };
+  // A shape relative to the body's origin. HalfSpace: a = normal; a sphere is a capsule with a == b.
+  struct Solid {
+    Kind kind = Kind::Sphere;
+    Vec a{0, 0, 0}, b{0, 0, 0};
+    S radius = 0;  // or the half-space's offset
+    S friction = 0, restitution = 0;
+  };
+  struct Surface {
+    S gap;      // distance to the thickened surface
+    Vec normal;
+  };
+  struct Candidate {
+    int point, solid;
+  };
+
+  void find_candidates(const Points<S>& x, const Points<S>& v, double seconds);
+  void place_solids(double t, std::vector<Solid>& out);
+  Surface surface(const Solid& solid, const Vec& x) const;
+  static Vec carried(const Solid& before, const Solid& after, const Vec& x);
+  bool entry(const Solid& solid, const Vec& from, const Vec& to, Vec& hit) const;
+  void touch(const Solid& before, const Solid& after, const Vec& from, S move, S h, Vec& x, Vec& v) const;
+
+  std::span<const Collider> colliders_;
+  Vec3 origin_{0, 0, 0};
+  S thickness_ = 0;
+  double tick_end_ = 0, now_ = 0;
+  std::vector<Shape> shapes_;
+  std::vector<Solid> solids_, previous_;
+  std::vector<S> solid_move_;
+  std::vector<Candidate> candidates_;
+  std::vector<const Collider*> callbacks_;
+  Points<S> start_;
+  Values<S> reach_, gap_;
+  Points<double> world_, normal_;
+  Values<double> distance_;
+};
+
+extern template class Contacts<float>;
+extern template class Contacts<double>;
+
+}  // namespace hooke

@@ -1,0 +1,86 @@
+// The one integrator core: it moves points, whatever they belong to. What accelerates and
+// constrains them is behind Dynamics; which method is a table from method.hpp.
+#pragma once
+
+#include <hooke/method.hpp>
+#include <hooke/types.hpp>
+
+namespace hooke {
+
+/// The equations of motion x'' = a(x, v, t) of a set of points, and what holds them: points
+/// that go where they are told, and surfaces they may not enter.
+template <class S>
+class Dynamics {
+ public:
+  virtual ~Dynamics() = default;
+
+  /// True where a(x, v, t) depends on v.
+  virtual bool uses_velocity() const = 0;
+
+  /// Sets a [m/s²], 0 for immovable points. Shapes (n, 3).
+  virtual void acceleration(const Points<S>& x, const Points<S>& v, double t, Points<S>& a) = 0;
+
+  /// Puts prescribed points at their place at time t. `from` holds the positions at time t0;
+  /// their velocity becomes (x - from) / (t - t0).
+  virtual void prescribe(double t0, const Points<S>& from, double t, Points<S>& x, Points<S>& v) = 0;
+
+  /// True where `prescribe` does anything.
+  virtual bool prescribes() const = 0;
+
+  /// Keeps points out of surfaces after a move from `from` at t0 to x at t1.
+  virtual void collide(double t0, const Points<S>& from, double t1, Points<S>& x, Points<S>& v) = 0;
+
+  /// True where `collide` may do anything until the next tick.
+  virtual bool collides() const = 0;
+
+  // For implicit methods only.
+  virtual const Values<S>& mass() const = 0;          ///< [kg], > 0
+  virtual const Values<S>& inverse_mass() const = 0;  ///< [1/kg], 0 = held
+  /// out += h² K d + h D d at (x, v).
+  virtual void add_implicit_times(const Points<S>& x, const Points<S>& v, S h, bool safe, const Points<S>& d,
+                                  Points<S>& out) = 0;
+};
+
+/// How an implicit solve went; explicit methods always converge.
+struct SolveResult {
+  bool converged = true;
+  double residual = 0;  ///< relative to the velocity scale
+};
+
+/// Runs one method. Owns scratch memory and nothing else: no allocation in a step once the
+/// number of points is known.
+template <class S>
+class Integrator {
+ public:
+  explicit Integrator(const Method& method) : method_(&method) {}
+
+  const Method& method() const { return *method_; }
+
+  /// One step from t to t + h. x and v belong to the same time before and after.
+  /// @throws std::invalid_argument where the method does not accept velocity-dependent forces
+  SolveResult step(Dynamics<S>& dynamics, Points<S>& x, Points<S>& v, double t, double h);
+
+  /// Must be called when anything but this integrator changed x, v, or what forces depend on.
+  void restart() { acceleration_known_ = false, increment_step_ = 0; }
+
+ private:
+  SolveResult run(const Splitting&, Dynamics<S>&, Points<S>& x, Points<S>& v, double t, double h);
+  SolveResult run(const Verlet&, Dynamics<S>&, Points<S>& x, Points<S>& v, double t, double h);
+  SolveResult run(const RungeKutta&, Dynamics<S>&, Points<S>& x, Points<S>& v, double t, double h);
+  SolveResult run(const Implicit&, Dynamics<S>&, Points<S>& x, Points<S>& v, double t, double h);
+  void finish(Dynamics<S>&, double t0, double t1, Points<S>& x, Points<S>& v);
+  bool solve_linear(Dynamics<S>&, S h, bool safe, double tolerance, const Points<S>& x, const Points<S>& v,
+                    const Points<S>& right, Points<S>& solution);
+
+  const Method* method_;
+  bool acceleration_known_ = false;  // acceleration_ is a(x, v, t) of the coming step's start
+  double increment_step_ = 0;        // the h that increment_ was made with; 0: not made yet
+  Points<S> acceleration_, increment_, from_, predicted_;
+  std::vector<Points<S>> stage_velocity_, stage_acceleration_;
+  Points<S> stage_x_, stage_v_, residual_, right_, direction_, product_, trial_x_, trial_v_, update_;
+};
+
+extern template class Integrator<float>;
+extern template class Integrator<double>;
+
+}  // namespace hooke

@@ -1,0 +1,355 @@
+#include <hooke/point_body.hpp>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <stdexcept>
+
+namespace hooke {
+
+namespace {
+
+// The automatic step keeps this share of the largest stable one: stiffness may grow a little
+// until it is looked at again.
+constexpr double kStepSafety = 0.9;
+// How often the automatic step is looked at again [s].
+constexpr double kEstimateInterval = 1.0 / 30;
+// Methods without a stable step still need one: ω h of this.
+constexpr double kUnstablePhase = 0.05;
+
+void check_finite(const Vec3& value, const char* what) {
+  if (!value.allFinite()) throw std::invalid_argument(std::string(what) + " must be finite");
+}
+
+}  // namespace
+
+template <class S>
+PointBody<S>::PointBody(std::string name, PointMasses<S> points, MotionSettings settings)
+    : Body(std::move(name)), points_(std::move(points)), settings_(settings), integrator_(*settings.method) {
+  const auto fail = [&](const std::string& rule) { throw std::invalid_argument("body \"" + this->name() + "\": " + rule); };
+  const Index n = points_.size();
+  if (points_.velocity.rows() != n || points_.mass.size() != n || points_.inverse_mass.size() != n)
+    fail("position, velocity, mass and inverse_mass must have the same length");
+  if (!points_.origin.allFinite() || !points_.position.allFinite() || !points_.velocity.allFinite())
+    fail("positions and velocities must be finite");
+  if (n > 0 && !((points_.mass > S(0)).all() && points_.mass.allFinite())) fail("masses must be positive");
+  if (n > 0 && !((points_.inverse_mass >= S(0)).all() && points_.inverse_mass.allFinite()))
+    fail("inverse masses must not be negative");
+  if (!(settings_.dt >= 0) || !std::isfinite(settings_.dt)) fail("dt must not be negative");
+  if (!(settings_.thickness >= 0) || !std::isfinite(settings_.thickness)) fail("thickness must not be negative");
+  start_ = previous_position_ = points_.position;
+  previous_velocity_ = points_.velocity;
+}
+
+template <class S>
+void PointBody<S>::add_field(std::unique_ptr<const ForceField<S>> field) {
+  if (field->uses_velocity() && !settings_.method->accepts_velocity_forces)
+    throw std::invalid_argument("body \"" + name() + "\": method " + std::string(settings_.method->name) +
+                                " accepts no forces of velocity (drag, dampers, wind)");
+  uses_velocity_ = uses_velocity_ || field->uses_velocity();
+  fields_.push_back(std::move(field));
+  last_estimate_ = -1;
+}
+
+template <class S>
+void PointBody<S>::check(Index point) const {
+  if (point < 0 || point >= size())
+    throw std::out_of_range("body \"" + name() + "\": point " + std::to_string(point) + " of " +
+                            std::to_string(size()));
+}
+
+template <class S>
+Points<double> PointBody<S>::world(const Points<S>& p) const {
+  return p.template cast<double>().rowwise() + points_.origin.transpose().array();
+}
+
+template <class S>
+Points<double> PointBody<S>::positions_between(double fraction) const {
+  const Points<double> before = world(previous_position_);
+  return before + fraction * (positions() - before);
+}
+
+template <class S>
+void PointBody<S>::set_position(Index point, const Vec3& position) {
+  check(point);
+  check_finite(position, "position");
+  points_.position.row(point) = (position - points_.origin).transpose().template cast<S>();
+  previous_position_.row(point) = points_.position.row(point);
+}
+
+template <class S>
+void PointBody<S>::set_velocity(Index point, const Vec3& velocity) {
+  check(point);
+  check_finite(velocity, "velocity");
+  points_.velocity.row(point) = velocity.transpose().template cast<S>();
+}
+
+template <class S>
+void PointBody<S>::hold(Index point) {
+  points_.inverse_mass[point] = 0;
+  points_.velocity.row(point).setZero();
+}
+
+template <class S>
+void PointBody<S>::pin(Index point) {
+  check(point);
+  hold(point);
+}
+
+template <class S>
+void PointBody<S>::release(Index point) {
+  check(point);
+  points_.inverse_mass[point] = 1 / points_.mass[point];
+  std::erase_if(moving_, [&](const Moving& pin) { return pin.point == point; });
+  for (Driven& group : driven_)
+    for (Index& driven : group.points)
+      if (driven == point) driven = -1;
+  last_estimate_ = -1;
+}
+
+template <class S>
+bool PointBody<S>::pinned(Index point) const {
+  check(point);
+  return points_.inverse_mass[point] == 0;
+}
+
+template <class S>
+void PointBody<S>::move_pin(Index point, const Vec3& target) {
+  check(point);
+  check_finite(target, "pin target");
+  if (!pinned(point))
+    throw std::invalid_argument("body \"" + name() + "\": point " + std::to_string(point) +
+                                " is not pinned; pin it before moving it");
+  const Vec3 from = points_.origin + points_.position.row(point).matrix().transpose().template cast<double>();
+  std::erase_if(moving_, [&](const Moving& pin) { return pin.point == point; });
+  moving_.push_back({point, from, target});
+}
+
+template <class S>
+void PointBody<S>::drive_pins(std::vector<Index> points, PinMotion motion) {
+  for (const Index point : points) check(point);
+  for (const Index point : points) hold(point);
+  Points<double> place(Index(points.size()), 3);
+  driven_.push_back({std::move(points), std::move(motion), std::move(place)});
+}
+
+template <class S>
+void PointBody<S>::add_force(Index point, const Vec3& force) {
+  check(point);
+  check_finite(force, "force");
+  pushed_.emplace_back(point, force);
+}
+
+template <class S>
+Energy PointBody<S>::energy(const Vec3& gravity) const {
+  Energy energy;
+  for (Index i = 0; i < size(); ++i) {
+    if (points_.inverse_mass[i] == 0) continue;
+    const double m = double(points_.mass[i]);
+    const Vec3 v = points_.velocity.row(i).matrix().transpose().template cast<double>();
+    const Vec3 x = points_.origin + points_.position.row(i).matrix().transpose().template cast<double>();
+    energy.kinetic += 0.5 * m * v.squaredNorm();
+    energy.gravitational -= m * gravity.dot(x);
+  }
+  for (const auto& field : fields_) energy.elastic += field->potential_energy(points_.position);
+  return energy;
+}
+
+template <class S>
+Vec3 PointBody<S>::momentum() const {
+  Vec3 sum = Vec3::Zero();
+  for (Index i = 0; i < size(); ++i)
+    if (points_.inverse_mass[i] != 0)
+      sum += double(points_.mass[i]) * points_.velocity.row(i).matrix().transpose().template cast<double>();
+  return sum;
+}
+
+template <class S>
+void PointBody<S>::begin_frame(double seconds, double waiting, double t0, double t1) {
+  if (!pushed_.empty() || !bank_.empty()) {
+    // The bank is a time line: what waits unsimulated comes before what is pushed now.
+    if (bank_.empty() && waiting > 0) bank_.push_back({waiting, {}});
+    bank_.push_back({seconds, std::move(pushed_)});
+    pushed_.clear();
+  }
+  frame_start_ = t0;
+  frame_end_ = t1;
+}
+
+// Turns the coming tick's share of the bank into constant accelerations.
+template <class S>
+void PointBody<S>::spend_bank(double seconds) {
+  pushing_ = false;
+  if (bank_.empty()) return;
+  push_acceleration_.setZero(size(), 3);
+  double left = seconds;
+  while (!bank_.empty() && left > 0) {
+    Banked& piece = bank_.front();
+    // A piece that ends with the tick but for rounding does.
+    const bool all = piece.seconds <= left + 1e-9 * seconds;
+    const double spent = all ? std::min(piece.seconds, left) : left;
+    for (const auto& [point, force] : piece.pushes) {
+      const Vec3 a = force * (spent / seconds) * double(points_.inverse_mass[point]);
+      push_acceleration_.row(point) += a.transpose().array().template cast<S>();
+      pushing_ = true;
+    }
+    left -= spent;
+    if (all)
+      bank_.pop_front();
+    else
+      piece.seconds -= spent;
+    if (left <= 1e-9 * seconds) break;
+  }
+}
+
+template <class S>
+void PointBody<S>::acceleration(const Points<S>& x, const Points<S>& v, double t, Points<S>& a) {
+  if (fields_.empty()) {
+    a.setZero(x.rows(), 3);
+  } else {
+    force_.setZero(x.rows(), 3);
+    for (const auto& field : fields_) field->add_force(x, v, t, force_);
+    a.resize(x.rows(), 3);
+    for (int k = 0; k < 3; ++k) a.col(k) = force_.col(k) * points_.inverse_mass;
+  }
+  for (int k = 0; k < 3; ++k) {
+    const S g = S(tick_.gravity[k]);
+    if (g != 0) a.col(k) += (points_.inverse_mass > S(0)).select(Values<S>::Constant(x.rows(), g), S(0));
+  }
+  if (pushing_) a += push_acceleration_;
+}
+
+template <class S>
+void PointBody<S>::prescribe(double t0, const Points<S>& from, double t, Points<S>& x, Points<S>& v) {
+  // A stage that ends with the tick but for rounding does: pins are exactly at their target then.
+  if (std::abs(t - tick_.end) < 1e-9 * (tick_.end - tick_.start)) t = tick_.end;
+  const auto place = [&](Index point, const Vec3& where) {
+    for (int k = 0; k < 3; ++k) {
+      x(point, k) = S(where[k] - points_.origin[k]);
+      if (t > t0) v(point, k) = (x(point, k) - from(point, k)) / S(t - t0);
+    }
+  };
+  for (Driven& group : driven_) {
+    group.motion(t, group.place);
+    for (std::size_t i = 0; i < group.points.size(); ++i)
+      if (group.points[i] >= 0) place(group.points[i], group.place.row(Index(i)).matrix().transpose());
+  }
+  for (const Moving& pin : moving_) {
+    const double done = frame_end_ > frame_start_ ? (t - frame_start_) / (frame_end_ - frame_start_) : 1;
+    place(pin.point, done >= 1 ? pin.to : Vec3(pin.from + done * (pin.to - pin.from)));
+  }
+}
+
+template <class S>
+void PointBody<S>::collide(double t0, const Points<S>& from, double t1, Points<S>& x, Points<S>& v) {
+  contacts_.resolve(t0, from, t1, points_.inverse_mass, x, v);
+}
+
+template <class S>
+void PointBody<S>::add_implicit_times(const Points<S>& x, const Points<S>& v, S h, bool safe, const Points<S>& d,
+                                      Points<S>& out) {
+  force_.setZero(x.rows(), 3);
+  damping_product_.setZero(x.rows(), 3);
+  for (const auto& field : fields_) {
+    field->add_stiffness_times(x, d, safe, force_);
+    if (field->uses_velocity()) field->add_damping_times(x, v, d, damping_product_);
+  }
+  out += (h * h) * force_ + h * damping_product_;
+}
+
+template <class S>
+double PointBody<S>::stable_step() const {
+  typename ForceField<S>::Rates rates;
+  for (const auto& field : fields_) {
+    const auto more = field->rate_bounds(points_.position, points_.velocity, points_.inverse_mass);
+    rates.omega_squared += more.omega_squared;
+    rates.gamma += more.gamma;
+  }
+  return largest_stable_step(*settings_.method, std::sqrt(rates.omega_squared), rates.gamma);
+}
+
+template <class S>
+void PointBody<S>::choose_substeps(const Tick& tick) {
+  const double length = tick.end - tick.start;
+  if (settings_.dt > 0) {
+    wanted_dt_ = settings_.dt;
+  } else if (last_estimate_ < 0 || tick.start - last_estimate_ >= kEstimateInterval * (1 - 1e-9)) {
+    last_estimate_ = tick.start;
+    wanted_dt_ = kStepSafety * stable_step();
+    if (settings_.method->stability_limit == 0) {
+      // No step is stable undamped; a small phase per step keeps the growth slow.
+      const double omega_step = kUnstablePhase * largest_stable_step(semi_implicit_euler(), 1, 0) / 2;
+      double omega2 = 0;
+      for (const auto& field : fields_)
+        omega2 += field->rate_bounds(points_.position, points_.velocity, points_.inverse_mass).omega_squared;
+      if (omega2 > 0) wanted_dt_ = std::max(wanted_dt_, omega_step / std::sqrt(omega2));
+    }
+  }
+  const double count = std::ceil(length / wanted_dt_ - 1e-9);
+  substeps_ = std::clamp<Index>(count < double(settings_.max_substeps) ? Index(count) : settings_.max_substeps, 1,
+                                settings_.max_substeps);
+}
+
+template <class S>
+SolveResult PointBody<S>::substep(double t, double h) {
+  return integrator_.step(*this, points_.position, points_.velocity, t, h);
+}
+
+template <class S>
+StepReport PointBody<S>::failure(StepReport::Status status, Index point, double time) const {
+  StepReport report;
+  report.status = status;
+  report.body = name();
+  report.point = point;
+  report.time = time;
+  const double stable = stable_step();
+  report.advice = "the substep was " + std::to_string(1e3 * (tick_.end - tick_.start) / double(substeps_)) +
+                  " ms, the largest stable one of " + std::string(settings_.method->name) + " is " +
+                  (stable > 0 ? std::to_string(1e3 * stable) + " ms" : "0 (none undamped)") +
+                  "; lower dt, lower the stiffness or choose another method";
+  return report;
+}
+
+template <class S>
+StepReport PointBody<S>::advance(const Tick& tick) {
+  tick_ = tick;
+  previous_position_ = points_.position;
+  previous_velocity_ = points_.velocity;
+  if (size() == 0) return {};
+  const double length = tick.end - tick.start;
+  choose_substeps(tick);
+  spend_bank(length);
+  integrator_.restart();
+  if (settings_.collides && !tick.colliders.empty())
+    contacts_.begin_tick(tick.colliders, points_, tick.start, tick.end, settings_.thickness);
+  SolveResult solve;
+  for (Index i = 0; i < substeps_ && solve.converged; ++i) {
+    const double t = tick.start + length * double(i) / double(substeps_);
+    solve = substep(t, length / double(substeps_));
+  }
+  if (!moving_.empty() && tick.end >= frame_end_) {
+    for (const Moving& pin : moving_) points_.velocity.row(pin.point).setZero();
+    moving_.clear();
+  }
+  const bool finite = points_.position.allFinite() && points_.velocity.allFinite();
+  if (finite && solve.converged) return {};
+
+  Index bad = -1;
+  if (!finite)
+    for (Index i = 0; i < size() && bad < 0; ++i)
+      if (!points_.position.row(i).allFinite() || !points_.velocity.row(i).allFinite()) bad = i;
+  points_.position = previous_position_;
+  points_.velocity = previous_velocity_;
+  return failure(finite ? StepReport::Status::NotConverged : StepReport::Status::NotFinite, bad, tick.start);
+}
+
+template <class S>
+void PointBody<S>::damp(double factor) {
+  for (int k = 0; k < 3; ++k)
+    points_.velocity.col(k) *= (points_.inverse_mass > S(0)).select(Values<S>::Constant(size(), S(factor)), S(1));
+}
+
+template class PointBody<float>;
+template class PointBody<double>;
+
+}  // namespace hooke

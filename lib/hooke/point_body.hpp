@@ -1,0 +1,127 @@
+// A body made of point masses, force fields and a method: particles, cloth, jelly and the
+// points of linear rigid bodies are all this.
+#pragma once
+
+#include <hooke/body.hpp>
+#include <hooke/contacts.hpp>
+#include <hooke/force_field.hpp>
+#include <hooke/integrator.hpp>
+#include <hooke/point_masses.hpp>
+
+#include <deque>
+#include <memory>
+
+namespace hooke {
+
+/// How a body is moved.
+struct MotionSettings {
+  const Method* method = &velocity_verlet();
+  double dt = 0;         ///< wanted substep [s]; 0: from the largest stable step
+  double thickness = 0;  ///< distance kept from colliders [m]
+  bool collides = true;  ///< false: colliders are ignored
+  Index max_substeps = 1'000'000;  ///< a tick; the automatic step stops there
+};
+
+template <class S>
+class PointBody : public Body, protected Dynamics<S> {
+ public:
+  /// @throws std::invalid_argument where sizes differ, a value is not finite, a mass is not
+  ///         positive, or the method does not accept the fields
+  PointBody(std::string name, PointMasses<S> points, MotionSettings settings);
+
+  /// Adds a force field. Order of addition is order of summation.
+  void add_field(std::unique_ptr<const ForceField<S>> field);
+
+  const PointMasses<S>& state() const { return points_; }
+  const MotionSettings& settings() const { return settings_; }
+  Index substeps() const { return substeps_; }  ///< in the last tick
+
+  /// The largest stable substep [s] of the method in the present state; infinity or 0 as in
+  /// largest_stable_step.
+  double stable_step() const;
+
+  Index size() const override { return points_.size(); }
+  Points<double> positions() const override { return world(points_.position); }
+  Points<double> velocities() const override { return points_.velocity.template cast<double>(); }
+  Values<double> masses() const override { return points_.mass.template cast<double>(); }
+  Points<double> positions_between(double fraction) const override;
+  Points<double> start_positions() const override { return world(start_); }
+  void set_position(Index point, const Vec3& position) override;
+  void set_velocity(Index point, const Vec3& velocity) override;
+  void pin(Index point) override;
+  void release(Index point) override;
+  bool pinned(Index point) const override;
+  void move_pin(Index point, const Vec3& target) override;
+  void drive_pins(std::vector<Index> points, PinMotion motion) override;
+  void add_force(Index point, const Vec3& force) override;
+  void clear_forces() override { pushed_.clear(); }
+  Energy energy(const Vec3& gravity) const override;
+  Vec3 momentum() const override;
+  void begin_frame(double seconds, double waiting, double t0, double t1) override;
+  StepReport advance(const Tick& tick) override;
+  void damp(double factor) override;
+
+ protected:
+  // Dynamics: the equations of motion of these points.
+  bool uses_velocity() const override { return uses_velocity_; }
+  void acceleration(const Points<S>& x, const Points<S>& v, double t, Points<S>& a) override;
+  void prescribe(double t0, const Points<S>& from, double t, Points<S>& x, Points<S>& v) override;
+  bool prescribes() const override { return !driven_.empty() || !moving_.empty(); }
+  void collide(double t0, const Points<S>& from, double t1, Points<S>& x, Points<S>& v) override;
+  bool collides() const override { return contacts_.any(); }
+  const Values<S>& mass() const override { return points_.mass; }
+  const Values<S>& inverse_mass() const override { return points_.inverse_mass; }
+  void add_implicit_times(const Points<S>& x, const Points<S>& v, S h, bool safe, const Points<S>& d,
+                          Points<S>& out) override;
+
+  /// One substep; linear rigid bodies add their impacts to it.
+  virtual SolveResult substep(double t, double h);
+
+  void check(Index point) const;
+  Points<double> world(const Points<S>& p) const;
+
+  PointMasses<S> points_;
+  Tick tick_;  // the one being simulated
+
+ private:
+  using Push = std::pair<Index, Vec3>;
+  struct Banked {
+    double seconds;
+    std::vector<Push> pushes;
+  };
+  struct Driven {
+    std::vector<Index> points;
+    PinMotion motion;
+    Points<double> place;
+  };
+  struct Moving {  // a pin on its way
+    Index point;
+    Vec3 from, to;  // world
+  };
+
+  void choose_substeps(const Tick& tick);
+  void spend_bank(double seconds);
+  void hold(Index point);
+  StepReport failure(StepReport::Status status, Index point, double time) const;
+
+  MotionSettings settings_;
+  Integrator<S> integrator_;
+  Contacts<S> contacts_;
+  std::vector<std::unique_ptr<const ForceField<S>>> fields_;
+  bool uses_velocity_ = false;
+  Points<S> start_, previous_position_, previous_velocity_, force_, damping_product_;
+  std::vector<Push> pushed_;
+  std::deque<Banked> bank_;
+  Points<S> push_acceleration_;
+  bool pushing_ = false;
+  std::vector<Driven> driven_;
+  std::vector<Moving> moving_;
+  double frame_start_ = 0, frame_end_ = 0;
+  Index substeps_ = 0;
+  double wanted_dt_ = 0, last_estimate_ = -1;
+};
+
+extern template class PointBody<float>;
+extern template class PointBody<double>;
+
+}  // namespace hooke

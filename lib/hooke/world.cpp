@@ -1,0 +1,110 @@
+#include <hooke/world.hpp>
+
+#include <cmath>
+#include <stdexcept>
+
+namespace hooke {
+
+Body& World::add(std::unique_ptr<Body> body) {
+  if (find(body->name())) throw std::invalid_argument("World: two bodies are called \"" + body->name() + "\"");
+  bodies_.push_back(std::move(body));
+  return *bodies_.back();
+}
+
+Body* World::find(const std::string& name) const {
+  for (const auto& body : bodies_)
+    if (body->name() == name) return body.get();
+  return nullptr;
+}
+
+void World::add_collider(Collider collider) {
+  if (!(collider.friction >= 0)) throw std::invalid_argument("collider \"" + collider.name + "\": friction must not be negative");
+  if (!(collider.restitution >= 0 && collider.restitution <= 1))
+    throw std::invalid_argument("collider \"" + collider.name + "\": restitution must be in [0, 1]");
+  colliders_.push_back(std::move(collider));
+}
+
+void World::set_gravity(const Vec3& gravity) {
+  if (!gravity.allFinite()) throw std::invalid_argument("World: gravity must be finite");
+  gravity_ = gravity;
+}
+
+void World::set_damping(double fraction_per_second) {
+  if (!(fraction_per_second >= 0 && fraction_per_second < 1))
+    throw std::invalid_argument("World: damping is a fraction per second in [0, 1), got " +
+                                std::to_string(fraction_per_second));
+  damping_ = fraction_per_second;
+}
+
+void World::clear_forces() {
+  for (const auto& body : bodies_) body->clear_forces();
+}
+
+// Bodies without physics are skipped. `work` also gets the body's place in bodies_.
+void World::for_each_body(const std::function<void(Body&, std::size_t)>& work) {
+  const auto one = [&](Index i) {
+    Body& body = *bodies_[std::size_t(i)];
+    if (body.has_physics()) work(body, std::size_t(i));
+  };
+  const Index n = Index(bodies_.size());
+  if (parallel_for_ && n > 1) {
+    parallel_for_(n, one);
+  } else {
+    for (Index i = 0; i < n; ++i) one(i);
+  }
+}
+
+StepReport World::update(double frame_seconds) {
+  const double waiting = clock_.remainder();
+  const std::int64_t ticks = clock_.bank(frame_seconds);
+  const double t0 = clock_.time(), t1 = clock_.time_at(clock_.ticks() + ticks);
+  for_each_body([&](Body& body, std::size_t) { body.begin_frame(frame_seconds, waiting, t0, t1); });
+  for (std::int64_t i = 0; i < ticks; ++i)
+    if (StepReport report = step(); !report.good()) return report;
+  clear_forces();
+  return {};
+}
+
+// One tick. Accelerations, velocities and positions are the business of each body's method.
+StepReport World::step() {
+  const Tick tick{clock_.time(), clock_.time_at(clock_.ticks() + 1), gravity(), colliders_};
+  reports_.assign(bodies_.size(), {});
+  for_each_body([&](Body& body, std::size_t i) { reports_[i] = body.advance(tick); });
+  for (const StepReport& report : reports_)
+    if (!report.good()) return report;
+  if (damping_ > 0) {
+    const double factor = std::pow(1 - damping_, tick.end - tick.start);
+    for_each_body([&](Body& body, std::size_t) { body.damp(factor); });
+  }
+  clock_.count_tick();
+  return {};
+}
+
+Energy World::energy() const {
+  Energy sum;
+  for (const auto& body : bodies_) {
+    const Energy energy = body->energy(gravity());
+    sum.kinetic += energy.kinetic;
+    sum.gravitational += energy.gravitational;
+    sum.elastic += energy.elastic;
+  }
+  return sum;
+}
+
+Vec3 World::momentum() const {
+  Vec3 sum = Vec3::Zero();
+  for (const auto& body : bodies_) sum += body->momentum();
+  return sum;
+}
+
+Vec3 World::displacement() const {
+  Vec3 sum = Vec3::Zero();
+  double mass = 0;
+  for (const auto& body : bodies_) {
+    sum += body->total_mass() * body->displacement();
+    mass += body->total_mass();
+  }
+  return mass > 0 ? Vec3(sum / mass) : sum;
+}
+
+}  // namespace hooke
