@@ -1,0 +1,49 @@
+#include <hooke/softbody/soft_body.hpp>
+
+#include <hooke/softbody/spring_field.hpp>
+
+#include <stdexcept>
+
+namespace hooke::softbody {
+
+namespace {
+
+template <class S>
+std::unique_ptr<Body> make(const SoftBodySettings& s) {
+  const Index n = s.positions.rows();
+  if (s.masses.size() != n || (s.velocities.rows() != 0 && s.velocities.rows() != n))
+    throw std::invalid_argument("body \"" + s.name + "\": " + std::to_string(n) + " positions, " +
+                                std::to_string(s.masses.size()) + " masses and " +
+                                std::to_string(s.velocities.rows()) + " velocities do not fit together");
+  PointMasses<S> points;
+  points.origin = s.origin;
+  points.position = s.positions.cast<S>();
+  points.velocity = s.velocities.rows() ? Points<S>(s.velocities.cast<S>()) : Points<S>(Points<S>::Zero(n, 3));
+  points.mass = s.masses.cast<S>();
+  points.inverse_mass = points.mass.inverse();
+  auto body = std::make_unique<PointBody<S>>(s.name, std::move(points), s.motion);
+  for (const Index pin : s.pins) body->pin(pin);
+  if (s.network && !s.network->springs.empty())
+    body->add_field(std::make_unique<SpringField<S>>(s.network, body->state().position));
+  if (s.wind) body->add_field(std::make_unique<WindField<S>>(*s.wind, s.triangles, n));
+  if (s.linear_drag != 0) body->add_field(std::make_unique<LinearDrag<S>>(s.linear_drag));
+  if (s.quadratic_drag != 0) body->add_field(std::make_unique<QuadraticDrag<S>>(s.quadratic_drag));
+  return body;
+}
+
+}  // namespace
+
+SoftBodySettings settings_of(const Cloth& cloth) {
+  SoftBodySettings settings;
+  settings.positions = cloth.positions;
+  settings.masses = cloth.masses;
+  settings.network = cloth.network;
+  settings.triangles = cloth.triangles;
+  return settings;
+}
+
+std::unique_ptr<Body> make_soft_body(const SoftBodySettings& settings) {
+  return settings.precision == Precision::Float ? make<float>(settings) : make<double>(settings);
+}
+
+}  // namespace hooke::softbody

@@ -1,0 +1,38 @@
+// Soft bodies: point masses joined by springs, with what acts on their surface.
+#pragma once
+
+#include <hooke/point_body.hpp>
+#include <hooke/softbody/cloth.hpp>
+#include <hooke/softbody/wind.hpp>
+
+#include <optional>
+
+namespace hooke::softbody {
+
+enum class Precision { Float, Double };
+
+/// Everything a soft body is made from. Positions are relative to `origin`.
+struct SoftBodySettings {
+  std::string name = "soft body";
+  Vec3 origin{0, 0, 0};                          ///< [m], in the world
+  Points<double> positions{0, 3};                ///< [m], (n, 3)
+  Points<double> velocities{0, 3};               ///< [m/s], (n, 3); empty: at rest
+  Values<double> masses;                         ///< [kg], (n), > 0
+  std::shared_ptr<const SpringNetwork> network;  ///< may be shared by many bodies; null: no springs
+  std::vector<Triangle> triangles;               ///< for wind and drawing
+  std::vector<Index> pins;                       ///< held from the start
+  std::optional<Wind> wind;                      ///< absent: no air at all
+  double linear_drag = 0;                        ///< on every point [N·s/m]
+  double quadratic_drag = 0;                     ///< on every point [N·s²/m²]
+  MotionSettings motion;
+  Precision precision = Precision::Float;
+};
+
+/// Takes points, masses, springs and triangles from a cloth.
+SoftBodySettings settings_of(const Cloth& cloth);
+
+/// Builds the body. A soft body is a PointBody with a SpringField and, where asked for, wind and drag.
+/// @throws std::invalid_argument naming the body, the rule and the value
+std::unique_ptr<Body> make_soft_body(const SoftBodySettings& settings);
+
+}  // namespace hooke::softbody

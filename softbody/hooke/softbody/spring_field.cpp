@@ -1,0 +1,208 @@
+#include <hooke/softbody/spring_field.hpp>
+
+#include <hooke/softbody/kernels.hpp>
+
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+#include <tuple>
+
+namespace hooke::softbody {
+
+namespace {
+
+// Shorter runs do not pay for themselves.
+constexpr Index kShortestRun = 8;
+
+template <class S>
+struct Unit {
+  Eigen::Matrix<S, 3, 1> n;
+  S length;
+};
+
+template <class S>
+Unit<S> direction(const Points<S>& x, int a, int b) {
+  const Eigen::Matrix<S, 3, 1> d = (x.row(b) - x.row(a)).matrix().transpose();
+  const S l = d.norm();
+  if (!(l > S(0))) return {Eigen::Matrix<S, 3, 1>::Zero(), S(0)};
+  return {d / l, l};
+}
+
+// Share of the stiffness that acts across the spring: 1 - L / l.
+template <class S>
+S across(const Unit<S>& unit, S rest) {
+  return unit.length > S(0) ? 1 - rest / unit.length : S(0);
+}
+
+}  // namespace
+
+template <class S>
+SpringField<S>::SpringField(std::shared_ptr<const SpringNetwork> network, const Points<S>& start)
+    : network_(std::move(network)) {
+  network_->check(start.rows());
+  const auto& springs = network_->springs;
+  std::vector<std::size_t> order(springs.size());
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  std::stable_sort(order.begin(), order.end(), [&](std::size_t i, std::size_t j) {
+    const Spring &s = springs[i], &t = springs[j];
+    return std::tuple(s.b - s.a, s.a) < std::tuple(t.b - t.a, t.a);
+  });
+  // Runs first, the rest behind them.
+  std::vector<std::size_t> loose, sorted;
+  for (std::size_t i = 0; i < order.size();) {
+    std::size_t end = i + 1;
+    const Spring& first = springs[order[i]];
+    while (end < order.size() && springs[order[end]].a == first.a + int(end - i) &&
+           springs[order[end]].b == first.b + int(end - i))
+      ++end;
+    if (Index(end - i) >= kShortestRun) {
+      runs_.push_back({Index(sorted.size()), Index(end - i), first.a, first.b});
+      sorted.insert(sorted.end(), order.begin() + std::ptrdiff_t(i), order.begin() + std::ptrdiff_t(end));
+    } else {
+      loose.insert(loose.end(), order.begin() + std::ptrdiff_t(i), order.begin() + std::ptrdiff_t(end));
+    }
+    i = end;
+  }
+  loose_ = Index(sorted.size());
+  sorted.insert(sorted.end(), loose.begin(), loose.end());
+
+  const Index n = Index(sorted.size());
+  stiffness_.resize(n), rest_.resize(n), rest_squared_.resize(n), damping_.resize(n);
+  a_.resize(sorted.size()), b_.resize(sorted.size());
+  for (Index i = 0; i < n; ++i) {
+    const Spring& s = springs[sorted[std::size_t(i)]];
+    a_[std::size_t(i)] = s.a, b_[std::size_t(i)] = s.b;
+    stiffness_[i] = S(s.stiffness), damping_[i] = S(s.damping);
+    damped_ = damped_ || s.damping > 0;
+    if (s.rest_length == Spring::kFromStart) {
+      // The same operations in the same order as the kernel's.
+      const S dx = start(s.b, 0) - start(s.a, 0), dy = start(s.b, 1) - start(s.a, 1), dz = start(s.b, 2) - start(s.a, 2);
+      rest_squared_[i] = dx * dx + dy * dy + dz * dz;
+      rest_[i] = std::sqrt(rest_squared_[i]);
+    } else {
+      rest_[i] = S(s.rest_length);
+      rest_squared_[i] = rest_[i] * rest_[i];
+    }
+  }
+}
+
+template <class S>
+void SpringField<S>::add_force(const Points<S>& x, const Points<S>& v, double, Points<S>& f) const {
+  S force[3][kBlock], gathered[12][kBlock];
+  SpringBlock<S> block{};
+  for (int k = 0; k < 3; ++k) block.f[k] = force[k];
+  const auto parameters = [&](Index first, int n) {
+    block.n = n;
+    block.stiffness = stiffness_.data() + first;
+    block.rest = rest_.data() + first;
+    block.rest_squared = rest_squared_.data() + first;
+    block.damping = damped_ ? damping_.data() + first : nullptr;
+  };
+  for (const Run& run : runs_) {
+    for (Index done = 0; done < run.count; done += kBlock) {
+      const int n = int(std::min<Index>(kBlock, run.count - done));
+      parameters(run.first + done, n);
+      for (int k = 0; k < 3; ++k) {
+        block.a[k] = x.col(k).data() + run.a + done, block.b[k] = x.col(k).data() + run.b + done;
+        if (damped_) block.va[k] = v.col(k).data() + run.a + done, block.vb[k] = v.col(k).data() + run.b + done;
+      }
+      spring_forces(block);
+      for (int k = 0; k < 3; ++k) {
+        add_to(f.col(k).data() + run.a + done, force[k], S(1), n);
+        add_to(f.col(k).data() + run.b + done, force[k], S(-1), n);
+      }
+    }
+  }
+  for (Index first = loose_; first < size(); first += kBlock) {
+    const int n = int(std::min<Index>(kBlock, size() - first));
+    const int *a = a_.data() + first, *b = b_.data() + first;
+    parameters(first, n);
+    for (int k = 0; k < 3; ++k) {
+      for (int i = 0; i < n; ++i) gathered[k][i] = x(a[i], k), gathered[3 + k][i] = x(b[i], k);
+      block.a[k] = gathered[k], block.b[k] = gathered[3 + k];
+      if (!damped_) continue;
+      for (int i = 0; i < n; ++i) gathered[6 + k][i] = v(a[i], k), gathered[9 + k][i] = v(b[i], k);
+      block.va[k] = gathered[6 + k], block.vb[k] = gathered[9 + k];
+    }
+    spring_forces(block);
+    for (int k = 0; k < 3; ++k)
+      for (int i = 0; i < n; ++i) f(a[i], k) += force[k][i], f(b[i], k) -= force[k][i];
+  }
+}
+
+template <class S>
+void SpringField<S>::add_stiffness_times(const Points<S>& x, const Points<S>& d, bool safe, Points<S>& out) const {
+  for (Index i = 0; i < size(); ++i) {
+    const int a = a_[std::size_t(i)], b = b_[std::size_t(i)];
+    const Unit<S> unit = direction(x, a, b);
+    S side = across(unit, rest_[i]);
+    if (safe) side = std::max(side, S(0));
+    const Eigen::Matrix<S, 3, 1> difference = (d.row(a) - d.row(b)).matrix().transpose();
+    const S along = difference.dot(unit.n);
+    const Eigen::Matrix<S, 3, 1> force = stiffness_[i] * (along * unit.n + side * (difference - along * unit.n));
+    for (int k = 0; k < 3; ++k) out(a, k) += force[k], out(b, k) -= force[k];
+  }
+}
+
+template <class S>
+void SpringField<S>::add_damping_times(const Points<S>& x, const Points<S>&, const Points<S>& d,
+                                       Points<S>& out) const {
+  for (Index i = 0; i < size(); ++i) {
+    if (damping_[i] == S(0)) continue;
+    const int a = a_[std::size_t(i)], b = b_[std::size_t(i)];
+    const Unit<S> unit = direction(x, a, b);
+    const S along = damping_[i] * (d.row(a) - d.row(b)).matrix().transpose().dot(unit.n);
+    for (int k = 0; k < 3; ++k) out(a, k) += along * unit.n[k], out(b, k) -= along * unit.n[k];
+  }
+}
+
+template <class S>
+double SpringField<S>::potential_energy(const Points<S>& x) const {
+  double sum = 0;
+  for (Index i = 0; i < size(); ++i) {
+    const Vec3 d = (x.row(b_[std::size_t(i)]) - x.row(a_[std::size_t(i)])).matrix().transpose().template cast<double>();
+    const double stretch = d.norm() - double(rest_[i]);
+    sum += 0.5 * double(stiffness_[i]) * stretch * stretch;
+  }
+  return sum;
+}
+
+template <class S>
+typename ForceField<S>::Rates SpringField<S>::rate_bounds(const Points<S>& x, const Points<S>&,
+                                                          const Values<S>& inverse_mass) const {
+  using Symmetric = Eigen::Matrix3d;
+  std::vector<Symmetric> stiffness(std::size_t(x.rows()), Symmetric::Zero());
+  std::vector<Symmetric> damping(damped_ ? std::size_t(x.rows()) : 0, Symmetric::Zero());
+  for (Index i = 0; i < size(); ++i) {
+    const int a = a_[std::size_t(i)], b = b_[std::size_t(i)];
+    const double weight = double(inverse_mass[a]) + double(inverse_mass[b]);
+    const Unit<S> unit = direction(x, a, b);
+    const Vec3 n = unit.n.template cast<double>();
+    const Symmetric along = n * n.transpose();
+    const double side = unit.length > S(0) ? std::max(0.0, double(across(unit, rest_[i]))) : 1.0;
+    const Symmetric k = double(stiffness_[i]) * weight * ((1 - side) * along + side * Symmetric::Identity());
+    const Symmetric c = double(damping_[i]) * weight * along;
+    for (const int point : {a, b}) {
+      if (inverse_mass[point] == S(0)) continue;
+      stiffness[std::size_t(point)] += k;
+      if (damped_) damping[std::size_t(point)] += c;
+    }
+  }
+  const auto largest = [](const std::vector<Symmetric>& matrices) {
+    double found = 0;
+    Eigen::SelfAdjointEigenSolver<Symmetric> solver;
+    for (const Symmetric& m : matrices) {
+      if (m.cwiseAbs().rowwise().sum().maxCoeff() <= found) continue;
+      solver.computeDirect(m, Eigen::EigenvaluesOnly);
+      found = std::max(found, solver.eigenvalues()[2]);
+    }
+    return found;
+  };
+  return {largest(stiffness), largest(damping)};
+}
+
+template class SpringField<float>;
+template class SpringField<double>;
+
+}  // namespace hooke::softbody
