@@ -2,6 +2,7 @@
 
 #include <hooke/softbody/kernels.hpp>
 
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 #include <numbers>
