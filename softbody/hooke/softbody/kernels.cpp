@@ -12,6 +12,12 @@
 #else
 #define HOOKE_CLONES
 #endif
+// Outputs never overlap inputs; compilers forget __restrict once a function is inlined.
+#if defined(__clang__)
+#define HOOKE_INDEPENDENT _Pragma("clang loop vectorize(assume_safety)")
+#else
+#define HOOKE_INDEPENDENT _Pragma("GCC ivdep")
+#endif
 #define HOOKE_INLINE static inline __attribute__((always_inline))
 
 namespace hooke::softbody {
@@ -28,6 +34,7 @@ HOOKE_INLINE void spring_loop(const SpringBlock<S>& s) {
   const S *__restrict bx = s.b[0], *__restrict by = s.b[1], *__restrict bz = s.b[2];
   const S *__restrict k = s.stiffness, *__restrict rest = s.rest, *__restrict rest2 = s.rest_squared;
   S *__restrict fx = s.f[0], *__restrict fy = s.f[1], *__restrict fz = s.f[2];
+  HOOKE_INDEPENDENT
   for (int i = 0; i < s.n; ++i) {
     const S dx = bx[i] - ax[i], dy = by[i] - ay[i], dz = bz[i] - az[i];
     const S l2 = dx * dx + dy * dy + dz * dz;
@@ -56,6 +63,7 @@ template <class S>
 HOOKE_INLINE void wind(const WindBlock<S>& s) {
   const S third = S(1) / S(3);
   S *__restrict fx = s.f[0], *__restrict fy = s.f[1], *__restrict fz = s.f[2];
+  HOOKE_INDEPENDENT
   for (int i = 0; i < s.n; ++i) {
     const S ux = s.x[1][0][i] - s.x[0][0][i], uy = s.x[1][1][i] - s.x[0][1][i], uz = s.x[1][2][i] - s.x[0][2][i];
     const S wx = s.x[2][0][i] - s.x[0][0][i], wy = s.x[2][1][i] - s.x[0][1][i], wz = s.x[2][2][i] - s.x[0][2][i];
@@ -79,6 +87,7 @@ HOOKE_INLINE void wind(const WindBlock<S>& s) {
 
 template <class S>
 HOOKE_INLINE void add(S* __restrict target, const S* __restrict source, S sign, int n) {
+  HOOKE_INDEPENDENT
   for (int i = 0; i < n; ++i) target[i] += sign * source[i];
 }
 
