@@ -158,7 +158,7 @@ void relax(TriangleMesh& mesh, std::span<const Capsule> capsules, double voxel_s
   std::vector<std::vector<Capsule>> kept(static_cast<std::size_t>(count));
   for (Index v = 0; v < count; ++v)
     kept[static_cast<std::size_t>(v)] = near_capsules(
-        capsules, mesh.vertices.row(v).matrix().transpose(), 3 * voxel_size, blend_radius);
+        capsules, mesh.vertices.row(v).matrix().transpose(), 1.5 * voxel_size, blend_radius);
   for (int round = 0; round < 4; ++round) {
     Points<double> sum = Points<double>::Zero(count, 3);
     Values<double> neighbours = Values<double>::Zero(count);
@@ -173,7 +173,7 @@ void relax(TriangleMesh& mesh, std::span<const Capsule> capsules, double voxel_s
       };
       Vec3 x = mesh.vertices.row(v).matrix();
       if (round < 3) x += 0.5 * (Vec3(sum.row(v).matrix() / neighbours[v]) - x);
-      for (int newton = 0; newton < 2; ++newton) {
+      for (int newton = 0; newton < (round < 3 ? 1 : 2); ++newton) {
         const double h = 1e-4 * voxel_size;
         const double d = field(x);
         const Vec3 gradient = Vec3(field(x + Vec3(h, 0, 0)) - d, field(x + Vec3(0, h, 0)) - d,
