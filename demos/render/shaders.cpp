@@ -20,7 +20,7 @@ centroid out float side;
 centroid out float hem;
 void main() {
   float t = profile.z, r = t, y = 0.0;
-  const float sweep = 0.9, quarter = 1.5707963;
+  const float sweep = 1.5, quarter = 1.5707963;
   if (t > 1.0) {
     float angle = min((t - 1.0) / sweep, quarter);
     r = 1.0 + sweep * sin(angle);
@@ -28,7 +28,7 @@ void main() {
   }
   place = floor_center + floor_radius * vec3(profile.x * r, y, profile.y * r);
   facing = vec3(0, 1, 0);
-  cloth_place = vec2(0);
+  cloth_place = vec2(t, 0);
   side = 0.0;
   hem = 1e3;
   gl_Position = to_clip * vec4(place, 1);
@@ -90,11 +90,12 @@ vec3 place_at(vec2 pixel, float depth) {
 
 // How much of each light a pixel sees: (key, rim, light from above, light from below).
 // Sample patterns are turned by one of sixteen angles in a fixed 4 x 4 tile, and the blur
-// that follows averages over exactly one tile: no noise stays on a smooth surface, and
-// nothing changes from frame to frame.
+// that follows averages over whole tiles: no noise stays on a smooth surface, and nothing
+// changes from frame to frame. A software driver runs both sides of an if but leaves a
+// loop as soon as it can, so what is costly hangs on loop counts.
 const char* const kVisibility = R"(
 uniform sampler2D key_depth;
-uniform sampler2DShadow key_shadow, rim_shadow, dome_shadow;
+uniform sampler2DShadow rim_shadow, dome_shadow;
 uniform mat4 to_key, to_rim, to_dome[DOME];
 uniform vec3 key_direction, rim_direction, dome_direction[DOME];
 uniform vec3 key_extent, rim_extent;  // half size of the lit boxes [m]
@@ -106,42 +107,46 @@ out vec4 visible;
 
 const float golden = 2.399963;
 
+// Soft shadow in the manner of percentage-closer soft shadows (Fernando 2005): the nearer
+// what blocks the light, the sharper. A sample counts only if what lies there can cover a
+// part of the light as seen from here; without that, high blockers would widen the disc
+// until low ones fall in, and shadows would have steps.
 float soft_shadow(vec3 p, vec3 n, float turn, float jitter) {
   float facing = dot(n, key_direction);
-  if (facing <= 0.0) return 1.0;
   float slope = sqrt(max(0.0, 1.0 - facing * facing));
   p += n * (0.0015 + 0.005 * slope);
   vec3 c = (to_key * vec4(p, 1)).xyz * 0.5 + 0.5;
-  if (any(greaterThan(abs(c.xy - 0.5), vec2(0.5)))) return 1.0;
   float depth = min(c.z, 0.9999);
   vec2 per_metre = 0.5 / key_extent.xy;
   // The plane of the surface: how depth changes across the disc of samples.
   vec3 right = vec3(to_key[0][0], to_key[1][0], to_key[2][0]) * key_extent.x;
   vec3 up = vec3(to_key[0][1], to_key[1][1], to_key[2][1]) * key_extent.y;
-  vec2 tilt = vec2(dot(n, right), dot(n, up)) / max(facing, 0.2);  // metres towards the light, a metre across
-  float depth_per_metre = 0.5 / key_extent.z;
-  float bias = 0.0012 * depth_per_metre;
-  float reach = min(key_tan * depth / depth_per_metre, 0.30);
-  float sum = 0.0, count = 0.0;
-  for (int i = 0; i < 12; ++i) {
-    float r = sqrt((float(i) + jitter) / 12.0), a = float(i) * golden + turn;
-    vec2 o = reach * r * vec2(cos(a), sin(a));
-    float d = texture(key_depth, c.xy + o * per_metre).r;
-    float here = depth + clamp(dot(tilt, o), -0.12, 0.12) * depth_per_metre - bias;
-    // Only what lies within the cone towards the light can dim it.
-    if (d < here && key_tan * (here - d) / depth_per_metre > 0.6 * r * reach - 0.004) { sum += d; count += 1.0; }
+  vec2 tilt = vec2(dot(n, right), dot(n, up)) / max(facing, 0.15);  // metres of depth, a metre across
+  float metres = 2.0 * key_extent.z, bias = 0.0012;
+  float reach = clamp(key_tan * depth * metres, 0.004, 0.30);
+  bool in_map = facing > 0.0 && all(lessThan(abs(c.xy - 0.5), vec2(0.5)));
+
+  float weight = 0.0, sum = 0.0;
+  int search = in_map ? 10 : 0;
+  for (int i = 0; i < search; ++i) {
+    float r = reach * sqrt((float(i) + jitter) / 10.0), a = float(i) * golden + turn;
+    vec2 o = r * vec2(cos(a), sin(a));
+    float gap = (depth - texture(key_depth, c.xy + o * per_metre).r) * metres + clamp(dot(tilt, o), -0.15, 0.15) - bias;
+    float w = gap > 0.0 ? clamp((key_tan * gap - 0.5 * r) / (0.3 * r) , 0.0, 1.0) : 0.0;
+    w /= (gap + 0.03);
+    weight += w;
+    sum += w * gap;
   }
-  if (count < 0.5) return 1.0;
-  float gap = max(0.0, depth - sum / count) / depth_per_metre;
-  float radius = clamp(key_tan * gap, 0.0025, reach);
-  float lit = 0.0;
-  for (int i = 0; i < 20; ++i) {
-    float r = sqrt((float(i) + jitter) / 20.0), a = float(i) * golden + turn;
-    vec2 o = radius * r * vec2(cos(a), sin(a));
-    float here = depth + clamp(dot(tilt, o), -0.12, 0.12) * depth_per_metre - bias;
-    lit += texture(key_shadow, vec3(c.xy + o * per_metre, here));
+  int taps = weight > 0.0 ? 14 : 0;
+  float radius = clamp(key_tan * sum / max(weight, 1e-6), 0.003, reach);
+  float hidden = 0.0;
+  for (int i = 0; i < taps; ++i) {
+    float r = radius * sqrt((float(i) + jitter) / 14.0), a = float(i) * golden + turn;
+    vec2 o = r * vec2(cos(a), sin(a));
+    float gap = (depth - texture(key_depth, c.xy + o * per_metre).r) * metres + clamp(dot(tilt, o), -0.15, 0.15) - bias;
+    hidden += gap > 0.0 ? clamp((key_tan * gap + 0.002 - 0.75 * r) / (0.25 * r + 0.001), 0.0, 1.0) : 0.0;
   }
-  return lit / 20.0;
+  return 1.0 - hidden / 14.0;
 }
 
 float rim_light(vec3 p, vec3 n, float turn, float jitter) {
@@ -151,19 +156,21 @@ float rim_light(vec3 p, vec3 n, float turn, float jitter) {
   if (any(greaterThan(abs(c.xy - 0.5), vec2(0.5)))) return 1.0;
   float here = min(c.z, 0.9999) - 0.002 / key_extent.z;
   float lit = 0.0;
-  for (int i = 0; i < 6; ++i) {
-    float r = sqrt((float(i) + jitter) / 6.0), a = float(i) * golden + turn;
+  for (int i = 0; i < 4; ++i) {
+    float r = sqrt((float(i) + jitter) / 4.0), a = float(i) * golden + turn;
     lit += texture(rim_shadow, vec3(c.xy + 0.02 * r * vec2(cos(a), sin(a)) / rim_extent.xy, here));
   }
-  return lit / 6.0;
+  return lit / 4.0;
 }
 
-// Light from all around, as parallel lights that each have a small depth map.
-vec2 dome_light(vec3 p, vec3 n, float turn, float jitter) {
+// Light from all around, as parallel lights that each have a small depth map. Every other
+// pixel asks every other light; the blur brings them together.
+vec2 dome_light(vec3 p, vec3 n, float turn, float jitter, int first) {
   float seen[2] = float[2](0.0, 0.0), all[2] = float[2](1e-4, 1e-4);
   p += n * 0.012;
   float spread = mix(0.015, 0.05, clamp(length(p - subject) / (2.0 * subject_radius), 0.0, 1.0));
-  for (int k = 0; k < DOME; ++k) {
+  int lights = n.y > 0.999 ? DOME_UP : DOME;
+  for (int k = first; k < lights; k += 2) {
     float weight = dot(n, dome_direction[k]);
     int half_of = k < DOME_UP ? 0 : 1;
     if (weight <= 0.0) continue;
@@ -183,8 +190,8 @@ float crease_light(vec3 p, vec3 n, float turn, float jitter, float depth) {
   const float reach = 0.07;
   float pixels = clamp(reach / (depth * 2.0 * length(ray_up) / picture.y), 2.0, 160.0);
   float hidden = 0.0;
-  for (int i = 0; i < 10; ++i) {
-    float r = (float(i) + jitter) / 10.0, a = float(i) * golden + turn;
+  for (int i = 0; i < 8; ++i) {
+    float r = (float(i) + jitter) / 8.0, a = float(i) * golden + turn;
     vec2 at = clamp(gl_FragCoord.xy + pixels * r * vec2(cos(a), sin(a)), vec2(0.5), picture - 0.5);
     at = floor(at) + 0.5;
     vec3 v = place_at(at, texelFetch(normal_depth, ivec2(at), 0).w) - p;
@@ -192,7 +199,7 @@ float crease_light(vec3 p, vec3 n, float turn, float jitter, float depth) {
     float up = dot(v, n) - 0.0015 - 0.0008 * depth * length(ray_up);
     hidden += max(0.0, up * inversesqrt(d2 + 1e-6)) * max(0.0, 1.0 - d2 / (reach * reach));
   }
-  return max(0.0, 1.0 - 2.2 * hidden / 10.0);
+  return max(0.0, 1.0 - 2.2 * hidden / 8.0);
 }
 
 void main() {
@@ -200,16 +207,18 @@ void main() {
   vec4 nd = texelFetch(normal_depth, pixel, 0);
   vec3 p = place_at(gl_FragCoord.xy, nd.w);
   visible = vec4(1);
-  if (length(p - subject) > 4.0 * subject_radius + 1.0) return;
+  int passes = length(p - subject) > 3.0 * subject_radius + 1.0 ? 0 : 1;
   int order[16] = int[16](0, 8, 2, 10, 12, 4, 14, 6, 3, 11, 1, 9, 15, 7, 13, 5);
   int k = order[(pixel.x & 3) + 4 * (pixel.y & 3)];
   float turn = float(k) * (6.2831853 / 16.0), jitter = (float((k * 7) & 15) + 0.5) / 16.0;
-  vec2 dome = dome_light(p, nd.xyz, turn, jitter);
-  float crease = crease_light(p, nd.xyz, turn, jitter, nd.w);
-  visible = vec4(soft_shadow(p, nd.xyz, turn, jitter), rim_light(p, nd.xyz, turn, jitter), dome * crease);
+  for (int pass = 0; pass < passes; ++pass) {
+    vec2 dome = dome_light(p, nd.xyz, turn, jitter, (pixel.x + pixel.y) & 1);
+    float crease = crease_light(p, nd.xyz, turn, jitter, nd.w);
+    visible = vec4(soft_shadow(p, nd.xyz, turn, jitter), rim_light(p, nd.xyz, turn, jitter), dome * crease);
+  }
 })";
 
-// One direction of a blur over a 4 x 4 tile that does not cross from surface to surface.
+// One direction of a blur over 4 x 4 tiles (a tent of two) that does not cross from surface to surface.
 const char* const kBlur = R"(
 uniform sampler2D visible;
 uniform vec2 along;
@@ -221,11 +230,11 @@ void main() {
   float slack = 1.0 / (0.004 + 0.0015 * nd.w);
   vec4 sum = vec4(0);
   float total = 0.0;
-  for (int i = -2; i <= 2; ++i) {
+  for (int i = -3; i <= 3; ++i) {
     ivec2 q = clamp(pixel + i * step_by, ivec2(0), last);
     vec4 other = texelFetch(normal_depth, q, 0);
     float off = dot(nd.xyz, place_at(vec2(q) + 0.5, other.w) - p) * slack;
-    float w = (abs(i) == 2 ? 0.5 : 1.0) * max(1e-4, 1.0 - off * off) * smoothstep(0.3, 0.9, dot(nd.xyz, other.xyz));
+    float w = (1.0 - 0.25 * abs(float(i))) * max(1e-4, 1.0 - off * off) * smoothstep(0.3, 0.9, dot(nd.xyz, other.xyz));
     if (i == 0) w = 1.0;
     sum += w * texelFetch(visible, q, 0);
     total += w;
@@ -243,12 +252,10 @@ centroid in float side;
 centroid in float hem;
 uniform sampler2D visible;
 uniform vec3 key_direction, rim_direction, key_color, rim_color, sky_color, ground_color;
-uniform vec3 floor_color, floor_center;
+uniform vec3 floor_color;
 uniform vec3 outside_color, inside_color, sheen_color;
 uniform float roughness, weave;
-uniform int kind;  // 0 floor, 1 matte, 2 cloth
 uniform int two_sided;
-uniform float floor_radius;
 out vec4 light;
 
 // The visibility of this surface here. At an outline the pixel's middle may show another
@@ -279,12 +286,13 @@ float noise(vec2 c) {
 }
 
 // 1 where a pattern of this many periods a pixel is resolved, 0 where it would alias.
-float resolved(float periods) { return 1.0 - smoothstep(0.18, 0.45, periods); }
+float resolved(float periods) { return 1.0 - smoothstep(0.08, 0.24, periods); }
 
 // A plain weave: warp and weft pass over each other in turn, each a little hill.
 struct Weave { vec2 tilt; float shade; };
 Weave weave_at(vec2 c, float periods) {
   Weave w = Weave(vec2(0), 1.0);
+  c += 0.12 * vec2(noise(c.yx * vec2(0.31, 0.05)), noise(c * vec2(0.31, 0.05)) );
   vec2 slub = c * vec2(0.021, 0.9), slub2 = c * vec2(0.9, 0.021);
   float streak = 0.5 * (noise(slub) + noise(slub2)) - 0.5;
   w.shade += 0.22 * streak * resolved(periods * 0.45);
@@ -298,8 +306,9 @@ Weave weave_at(vec2 c, float periods) {
     vec2 across = warp_on_top ? vec2(f.x, 0) : vec2(0, f.y);
     vec2 length_ways = warp_on_top ? vec2(0, f.y) : vec2(f.x, 0);
     w.tilt = fine * (1.5 * across + 0.8 * length_ways);
-    float gap = 1.0 - 0.55 * smoothstep(0.30, 0.5, max(abs(across.x), abs(across.y))) - 0.25 * smoothstep(0.35, 0.5, max(abs(length_ways.x), abs(length_ways.y)));
-    w.shade *= mix(1.0, gap * 1.18 * (0.92 + 0.16 * hash(cell)), fine);
+    vec2 hill = cos(6.2831853 * vec2(across.x + across.y, length_ways.x + length_ways.y));  // 1 on the crest
+    float gap = 0.86 + 0.20 * hill.x + 0.10 * hill.y - 0.10 * (1.0 - hill.x) * (1.0 - hill.y);
+    w.shade *= mix(1.0, gap * (0.96 + 0.16 * hash(cell)), fine);
   }
   return w;
 }
@@ -322,35 +331,37 @@ vec3 lit_by(Surface s, vec3 n, vec3 v, vec3 l, vec3 color, float seen) {
   vec3 h = normalize(l + v);
   float nh = clamp(dot(n, h), 0.0, 1.0), nv = clamp(dot(n, v), 0.02, 1.0), lh = clamp(dot(l, h), 0.0, 1.0);
   vec3 back = s.color;
-  if (kind == 2) back += s.sheen * charlie(nh, nl, nv, s.rough);
-  else {
-    float a = s.rough * s.rough, fresnel = 0.04 + 0.96 * pow(1.0 - lh, 5.0);
-    float k = 0.5 * a;
-    back += vec3(fresnel * ggx(nh, a) * 0.25 / ((nl * (1.0 - k) + k) * (nv * (1.0 - k) + k)));
-  }
+#if CLOTH
+  back += s.sheen * charlie(nh, nl, nv, s.rough);
+#else
+  float a = s.rough * s.rough, fresnel = 0.04 + 0.96 * pow(1.0 - lh, 5.0);
+  float k = 0.5 * a;
+  back += vec3(fresnel * ggx(nh, a) * 0.25 / ((nl * (1.0 - k) + k) * (nv * (1.0 - k) + k)));
+#endif
   return back * color * nl * seen;
 }
 
 vec3 floor_light(vec4 seen) {
   // The lamps light a pool around the subject that fades towards the background.
-  vec2 from = place.xz - floor_center.xz;
-  float away = length(from) / floor_radius, height = place.y / floor_radius;
-  float pool = mix(0.42, 1.0, exp(-2.2 * away * away)) * mix(1.0, 0.82, smoothstep(0.0, 1.2, height));
+  float t = cloth_place.x;  // along the floor's profile
+  float pool = mix(0.36, 1.0, exp(-0.42 * t * t));
   vec3 key = key_color * key_direction.y * seen.x;
-  vec3 rim = rim_color * rim_direction.y * 0.35 * seen.y;
-  return floor_color * (pool * (key + rim) + mix(0.55, 1.0, pool) * sky_color * seen.z);
+  vec3 rim = rim_color * rim_direction.y * 0.14 * seen.y;
+  return floor_color * (pool * (key + rim) + mix(0.3, 1.0, pool) * sky_color * seen.z);
 }
 
 void main() {
   vec3 n = normalize(facing), v = normalize(eye - place);
-  if (kind == 0) { light = vec4(floor_light(visibility(n)), 1); return; }
-
+#if FLOOR
+  light = vec4(floor_light(visibility(n)), 1);
+#else
   bool back_face = two_sided == 1 && !gl_FrontFacing;
   if (back_face) n = -n;
   bool inside = back_face || side > 0.75;
   vec4 seen = visibility(n);
   Surface s = Surface(inside ? inside_color : outside_color, sheen_color * (inside ? 0.35 : 1.0), roughness);
-  if (kind == 2 && weave > 0.0) {
+#if CLOTH
+  if (weave > 0.0) {
     vec2 dx = dFdx(cloth_place), dy = dFdy(cloth_place);
     vec2 c = cloth_place * weave;
     Weave w = weave_at(c, weave * max(length(dx), length(dy)));
@@ -368,14 +379,19 @@ void main() {
       n = normalize(n + w.tilt.x * normalize(t - n * dot(n, t)) + w.tilt.y * normalize(b - n * dot(n, b)));
     }
   }
+#endif
   float nv = clamp(dot(n, v), 0.0, 1.0);
   vec3 result = lit_by(s, n, v, key_direction, key_color, seen.x) + lit_by(s, n, v, rim_direction, rim_color, seen.y);
   float up = 0.5 + 0.5 * n.y;
   vec3 around = sky_color * up * seen.z + ground_color * floor_color * (1.0 - up) * seen.w;
   result += s.color * around;
-  if (kind == 2) result += s.sheen * around * 0.9 * pow(1.0 - nv, 3.0);
-  else result += around * 0.5 * (0.04 + 0.5 * pow(1.0 - nv, 5.0) * (1.0 - s.rough * 0.6));
+#if CLOTH
+  result += s.sheen * around * 0.9 * pow(1.0 - nv, 3.0);
+#else
+  result += around * 0.5 * (0.04 + 0.5 * pow(1.0 - nv, 5.0) * (1.0 - s.rough * 0.6));
+#endif
   light = vec4(result, 1);
+#endif
 })";
 
 // Tone curve: Hill's fit of the ACES reference and output transforms. It is applied to
@@ -427,7 +443,12 @@ std::string visibility_fragment_shader() {
   return kVersion + dome_size() + kPlaceOfPixel + kVisibility;
 }
 std::string blur_fragment_shader() { return std::string(kVersion) + kPlaceOfPixel + kBlur; }
-std::string lit_fragment_shader() { return std::string(kVersion) + kPlaceOfPixel + kLit; }
+std::string lit_fragment_shader(Shade shade) {
+  const char* const choice = shade == Shade::Floor   ? "#define FLOOR 1\n#define CLOTH 0\n"
+                             : shade == Shade::Matte ? "#define FLOOR 0\n#define CLOTH 0\n"
+                                                     : "#define FLOOR 0\n#define CLOTH 1\n";
+  return std::string(kVersion) + choice + kPlaceOfPixel + kLit;
+}
 std::string develop_fragment_shader() { return std::string(kVersion) + kDevelop; }
 
 }  // namespace hooke::render

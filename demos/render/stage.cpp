@@ -154,9 +154,10 @@ struct Uploaded {
     glBufferData(GL_ARRAY_BUFFER, static_cast<GLsizeiptr>(list.size() * sizeof list[0]), list.data(), GL_STREAM_DRAW);
   }
 
-  void draw(std::size_t count) const {
+  void draw(const Surface::Range& range) const {
     glBindVertexArray(array);
-    glDrawElements(GL_TRIANGLES, static_cast<GLsizei>(count), GL_UNSIGNED_INT, nullptr);
+    glDrawElements(GL_TRIANGLES, static_cast<GLsizei>(range.count), GL_UNSIGNED_INT,
+                   reinterpret_cast<void*>(range.first * sizeof(std::uint32_t)));
   }
 };
 
@@ -198,8 +199,6 @@ struct Stage::Studio {
   void make_targets();
   Box upload(std::span<const Model> models);
   void draw_depth_maps(std::span<const Model> models, const Box& box);
-  template <class Draw>
-  void draw_models(gl::Program& program, std::span<const Model> models, const Draw& before_each);
   void draw_floor(gl::Program& program, const View& view);
   void draw_prepass(std::span<const Model> models, const Camera& camera, const View& view);
   void draw_visibility(const Camera& camera, const View& view, const Box& box);
@@ -211,7 +210,7 @@ struct Stage::Studio {
   int width, height, supersample;
   Look look;
   gl::Context context;
-  gl::Program depth, prepass, floor_prepass, visibility, blur, lit, floor_lit, developer;
+  gl::Program depth, prepass, floor_prepass, visibility, blur, lit_floor, lit_matte, lit_cloth, developer;
   GLuint empty_array = 0, floor_array = 0;
   GLsizei floor_count = 0;
   GLuint key_map = 0, rim_map = 0, dome_map = 0, key_target = 0, rim_target = 0, dome_target = 0;
@@ -239,8 +238,9 @@ Stage::Studio::Studio(int width_, int height_, int supersample_, const Look& loo
   floor_prepass = gl::Program("floor prepass", floor_vertex_shader(), prepass_fragment_shader());
   visibility = gl::Program("visibility", full_screen_vertex_shader(), visibility_fragment_shader());
   blur = gl::Program("blur", full_screen_vertex_shader(), blur_fragment_shader());
-  lit = gl::Program("lit", surface_vertex_shader(), lit_fragment_shader());
-  floor_lit = gl::Program("lit floor", floor_vertex_shader(), lit_fragment_shader());
+  lit_floor = gl::Program("lit floor", floor_vertex_shader(), lit_fragment_shader(Shade::Floor));
+  lit_matte = gl::Program("lit matte", surface_vertex_shader(), lit_fragment_shader(Shade::Matte));
+  lit_cloth = gl::Program("lit cloth", surface_vertex_shader(), lit_fragment_shader(Shade::Cloth));
   developer = gl::Program("develop", full_screen_vertex_shader(), develop_fragment_shader());
   make_floor();
   make_targets();
@@ -251,7 +251,7 @@ Stage::Studio::Studio(int width_, int height_, int supersample_, const Look& loo
 void Stage::Studio::make_floor() {
   constexpr int around = 96;
   std::vector<float> rings = {0, 0.25f, 0.5f, 0.75f};
-  for (int k = 0; k <= 24; ++k) rings.push_back(1 + 1.42f * static_cast<float>(k) / 24);
+  for (int k = 0; k <= 24; ++k) rings.push_back(1 + 2.36f * static_cast<float>(k) / 24);
   rings.push_back(6);
   std::vector<float> points;
   for (const float ring : rings)
@@ -332,9 +332,9 @@ Box Stage::Studio::upload(std::span<const Model> models) {
 }
 
 void Stage::Studio::draw_depth_maps(std::span<const Model> models, const Box& box) {
-  const auto draw_into = [&](const Matrix4f& to_clip) {
+  const auto draw_into = [&](const Matrix4f& to_clip, Surface::Range (Surface::*range)() const) {
     depth.set("to_clip", to_clip);
-    for (std::size_t i = 0; i < models.size(); ++i) uploaded[i].draw(uploaded[i].surface->sheet_index_count());
+    for (std::size_t i = 0; i < models.size(); ++i) uploaded[i].draw((*uploaded[i].surface.*range)());
   };
   depth.use();
   const Vec3 key_direction = look.key_direction.normalized(), rim_direction = look.rim_direction.normalized();
@@ -343,11 +343,11 @@ void Stage::Studio::draw_depth_maps(std::span<const Model> models, const Box& bo
   glBindFramebuffer(GL_FRAMEBUFFER, key_target);
   glViewport(0, 0, kKeyMap, kKeyMap);
   glClear(GL_DEPTH_BUFFER_BIT);
-  draw_into(key_view.to_clip);
+  draw_into(key_view.to_clip, &Surface::sheet);
   glBindFramebuffer(GL_FRAMEBUFFER, rim_target);
   glViewport(0, 0, kRimMap, kRimMap);
   glClear(GL_DEPTH_BUFFER_BIT);
-  draw_into(rim_view.to_clip);
+  draw_into(rim_view.to_clip, &Surface::sheet);
 
   glBindFramebuffer(GL_FRAMEBUFFER, dome_target);
   glClear(GL_DEPTH_BUFFER_BIT);
@@ -357,18 +357,8 @@ void Stage::Studio::draw_depth_maps(std::span<const Model> models, const Box& bo
     const LightView view = light_view(box, dome[static_cast<std::size_t>(k)], kDomeTile);
     dome_reach = std::max({dome_reach, view.half_size.x(), view.half_size.y()});
     glViewport(kDomeTile * (k % kDomeColumns), kDomeTile * (k / kDomeColumns), kDomeTile, kDomeTile);
-    draw_into(view.to_clip);
+    draw_into(view.to_clip, &Surface::coarse);
     dome_views.push_back(view.to_clip);
-  }
-}
-
-template <class Draw>
-void Stage::Studio::draw_models(gl::Program& program, std::span<const Model> models, const Draw& before_each) {
-  program.use();
-  for (std::size_t i = 0; i < models.size(); ++i) {
-    program.set("two_sided", models[i].thickness > 0 ? 0 : 1);
-    before_each(models[i]);
-    uploaded[i].draw(uploaded[i].surface->indices().size());
   }
 }
 
@@ -391,7 +381,11 @@ void Stage::Studio::draw_prepass(std::span<const Model> models, const Camera& ca
     program->set("to_clip", view.to_clip);
     program->set("two_sided", 0);
   }
-  draw_models(prepass, models, [](const Model&) {});
+  prepass.use();
+  for (std::size_t i = 0; i < models.size(); ++i) {
+    prepass.set("two_sided", models[i].thickness > 0 ? 0 : 1);
+    uploaded[i].draw(uploaded[i].surface->all());
+  }
   floor_prepass.use();
   draw_floor(floor_prepass, view);
 }
@@ -412,10 +406,9 @@ void Stage::Studio::draw_visibility(const Camera& camera, const View& view, cons
   visibility.use();
   set_pixels(visibility, camera, view);
   visibility.set_texture("key_depth", 1, GL_TEXTURE_2D, key_map);
-  visibility.set_texture("key_shadow", 2, GL_TEXTURE_2D, key_map);
-  visibility.set_texture("rim_shadow", 3, GL_TEXTURE_2D, rim_map);
-  visibility.set_texture("dome_shadow", 4, GL_TEXTURE_2D, dome_map);
-  for (GLuint unit = 2; unit <= 4; ++unit) glBindSampler(unit, compare_sampler);
+  visibility.set_texture("rim_shadow", 2, GL_TEXTURE_2D, rim_map);
+  visibility.set_texture("dome_shadow", 3, GL_TEXTURE_2D, dome_map);
+  for (const GLuint unit : {2u, 3u}) glBindSampler(unit, compare_sampler);
   visibility.set("to_key", key_view.to_clip);
   visibility.set("to_rim", rim_view.to_clip);
   visibility.set("to_dome", dome_views);
@@ -431,7 +424,7 @@ void Stage::Studio::draw_visibility(const Camera& camera, const View& view, cons
   visibility.set("subject", box.middle());
   visibility.set("subject_radius", box.radius());
   glDrawArrays(GL_TRIANGLES, 0, 3);
-  for (GLuint unit = 2; unit <= 4; ++unit) glBindSampler(unit, 0);
+  for (const GLuint unit : {2u, 3u}) glBindSampler(unit, 0);
 
   blur.use();
   set_pixels(blur, camera, view);
@@ -447,34 +440,33 @@ void Stage::Studio::draw_visibility(const Camera& camera, const View& view, cons
 void Stage::Studio::draw_lit(std::span<const Model> models, const Camera& camera, const View& view) {
   glBindFramebuffer(GL_FRAMEBUFFER, light_target);
   glClear(GL_DEPTH_BUFFER_BIT | GL_COLOR_BUFFER_BIT);
-  for (gl::Program* program : {&lit, &floor_lit}) {
+  for (gl::Program* program : {&lit_floor, &lit_matte, &lit_cloth}) {
     program->use();
     set_pixels(*program, camera, view);
     program->set_texture("visible", 1, GL_TEXTURE_2D, visible[0]);
     program->set("to_clip", view.to_clip);
     program->set("key_direction", Vec3(look.key_direction.normalized()));
     program->set("rim_direction", Vec3(look.rim_direction.normalized()));
-    program->set("key_color", Vec3(look.key_intensity * Vec3(1.62, 1.53, 1.40)));
-    program->set("rim_color", Vec3(look.rim_intensity * Vec3(1.05, 1.28, 1.60)));
-    program->set("sky_color", Vec3(look.fill_intensity * Vec3(0.60, 0.65, 0.72)));
-    program->set("ground_color", Vec3(look.fill_intensity * Vec3(1.15, 1.10, 1.05)));
+    program->set("key_color", Vec3(look.key_intensity * Vec3(2.05, 1.90, 1.68)));
+    program->set("rim_color", Vec3(look.rim_intensity * Vec3(1.35, 1.68, 2.15)));
+    program->set("sky_color", Vec3(look.fill_intensity * Vec3(0.40, 0.44, 0.50)));
+    program->set("ground_color", Vec3(look.fill_intensity * Vec3(0.95, 0.90, 0.85)));
     program->set("floor_color", look.floor_color);
-    program->set("floor_center", floor_center);
-    program->set("floor_radius", floor_radius);
-    program->set("two_sided", 0);
-    program->set("kind", 0);
   }
-  draw_models(lit, models, [this](const Model& model) {
-    const Material& m = model.material;
-    lit.set("kind", m.kind == Material::Kind::Cloth ? 2 : 1);
-    lit.set("outside_color", m.color);
-    lit.set("inside_color", m.inside_color);
-    lit.set("sheen_color", m.sheen);
-    lit.set("roughness", m.roughness);
-    lit.set("weave", model.uv ? m.weave : 0.0);
-  });
-  floor_lit.use();
-  draw_floor(floor_lit, view);
+  for (std::size_t i = 0; i < models.size(); ++i) {
+    const Material& m = models[i].material;
+    gl::Program& program = m.kind == Material::Kind::Cloth ? lit_cloth : lit_matte;
+    program.use();
+    program.set("two_sided", models[i].thickness > 0 ? 0 : 1);
+    program.set("outside_color", m.color);
+    program.set("inside_color", m.inside_color);
+    program.set("sheen_color", m.sheen);
+    program.set("roughness", m.roughness);
+    program.set("weave", models[i].uv ? m.weave : 0.0);
+    uploaded[i].draw(uploaded[i].surface->all());
+  }
+  lit_floor.use();
+  draw_floor(lit_floor, view);
 }
 
 Image Stage::Studio::develop() {
@@ -507,7 +499,7 @@ Image Stage::Studio::draw(std::span<const Model> models, const Camera& camera) {
   // The floor follows what the camera looks at and is always wider than the camera is far.
   floor_center = Vec3(camera.target.x(), 0, camera.target.z());
   const Vec3 away = camera.eye - floor_center;
-  floor_radius = std::max(8.0, 1.3 * std::hypot(away.x(), away.z()));
+  floor_radius = std::max(6.0, 1.2 * std::hypot(away.x(), away.z()));
   const View view = view_of(camera, static_cast<double>(width) / height, 12 * floor_radius + away.norm());
 
   const Box box = upload(models);

@@ -26,8 +26,8 @@ struct Material {
     Cloth   ///< woven: sheen at grazing angles, lining, thread detail, stitched hem
   };
   Kind kind = Kind::Matte;
-  Vec3 color{0.44, 0.405, 0.37};        ///< outside; the default is a warm grey mannequin
-  Vec3 inside_color{0.05, 0.04, 0.045};  ///< what back faces show (cloth: the lining)
+  Vec3 color{0.38, 0.35, 0.32};        ///< outside; the default is a warm grey mannequin
+  Vec3 inside_color{0.060, 0.040, 0.050};  ///< what back faces show (cloth: the lining)
   Vec3 sheen{0.30, 0.12, 0.11};          ///< cloth: colour of the fuzz at grazing angles
   double roughness = 0.55;  ///< in (0, 1]; higher spreads and dims the highlight (matte) or sheen (cloth)
   double weave = 700;       ///< cloth: threads per metre, 0 for none; drawn only where the model has uv
@@ -45,14 +45,14 @@ struct Model {
 
 /// The light in the studio.
 struct Look {
-  Vec3 key_direction{-0.52, 0.72, 0.46};  ///< from the subject towards the large soft light; any length
+  Vec3 key_direction{-0.66, 0.70, 0.34};  ///< from the subject towards the large soft light; any length
   double key_intensity = 1;               ///< relative to the studio's setting
   double key_size = 0.22;                 ///< angle the light fills, seen from the subject [rad]: softness of shadows
   Vec3 rim_direction{0.62, 0.42, -0.66};  ///< towards the cool light behind the subject; any length
   double rim_intensity = 1;
   double fill_intensity = 1;              ///< light from all around
   double exposure = 1;                    ///< multiplies everything before tone mapping
-  Vec3 floor_color{0.46, 0.46, 0.47};     ///< linear RGB reflectance of the floor
+  Vec3 floor_color{0.36, 0.36, 0.37};     ///< linear RGB reflectance of the floor
 };
 
 /// The default look turned so that, for `camera`, the key light comes from the left and

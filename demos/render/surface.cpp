@@ -67,6 +67,7 @@ Surface::Surface(const Model& model)
   hem_.assign(position_.size(), kNoHem);
   if (thickness_ > 0) measure_hem();
   index_sheets();
+  index_coarse();
 }
 
 bool Surface::fits(const Model& model) const {
@@ -179,6 +180,33 @@ void Surface::index_sheets() {
     vertex.side = 0;
     drawn_[2 * n + 2 * border_slot_[i]] = drawn_[2 * n + 2 * border_slot_[i] + 1] = vertex;
   }
+}
+
+// Halves the given mesh until it has few triangles by merging each vertex with one free
+// neighbour. Only connectivity is used, so the result moves with the mesh; what it loses
+// in shape is about an edge length, far below what light from all around resolves.
+void Surface::index_coarse() {
+  constexpr std::size_t kEnough = 8000;
+  std::vector<Triangle> triangles = given_;
+  std::vector<int> merged(static_cast<std::size_t>(given_count_));
+  for (int round = 0; round < 4 && triangles.size() > kEnough; ++round) {
+    std::fill(merged.begin(), merged.end(), -1);
+    for (const Triangle& t : triangles)
+      for (int k = 0; k < 3; ++k) {
+        const int a = t[k], b = t[(k + 1) % 3];
+        if (merged[a] < 0 && merged[b] < 0) merged[a] = merged[b] = std::min(a, b);
+      }
+    std::vector<Triangle> fewer;
+    for (Triangle t : triangles) {
+      for (int& corner : t)
+        if (merged[corner] >= 0) corner = merged[corner];
+      if (t[0] != t[1] && t[1] != t[2] && t[2] != t[0]) fewer.push_back(t);
+    }
+    triangles = std::move(fewer);
+  }
+  for (const Triangle& t : triangles)
+    for (int corner : t) indices_.push_back(static_cast<std::uint32_t>(corner));
+  coarse_count_ = 3 * triangles.size();
 }
 
 void Surface::update(const Points<double>& vertices) {

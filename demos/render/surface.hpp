@@ -35,8 +35,16 @@ class Surface {
 
   const std::vector<SurfaceVertex>& vertices() const { return drawn_; }
   const std::vector<std::uint32_t>& indices() const { return indices_; }
-  /// The first so many indices are the outer sheet, which is enough to cast shadows.
-  std::size_t sheet_index_count() const { return 3 * sheet_.size(); }
+  /// A run of indices().
+  struct Range {
+    std::size_t first, count;
+  };
+  /// What is seen.
+  Range all() const { return {0, indices_.size() - coarse_count_}; }
+  /// The outer sheet, which is enough to cast shadows.
+  Range sheet() const { return {0, 3 * sheet_.size()}; }
+  /// The outer sheet with few triangles, enough to dim the light from all around.
+  Range coarse() const { return {indices_.size() - coarse_count_, coarse_count_}; }
   const Vec3& lower() const { return lower_; }  ///< bounding box after update() [m]
   const Vec3& upper() const { return upper_; }
 
@@ -48,7 +56,7 @@ class Surface {
   void find_border();
   void measure_hem();
   void index_sheets();
-  void compute_normals();
+  void index_coarse();
   void write_sheets();
 
   std::vector<Triangle> given_;  // as the model has them
@@ -66,6 +74,7 @@ class Surface {
   std::vector<int> border_slot_;     // vertex -> place in border_vertices_, or -1
   std::vector<float> hem_;
   std::vector<std::uint32_t> indices_;
+  std::size_t coarse_count_ = 0;
 
   std::vector<Vec3> position_, normal_;
   std::vector<SurfaceVertex> drawn_;

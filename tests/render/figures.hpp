@@ -86,7 +86,7 @@ inline Cape cape(int columns = 60, int rows = 80, double phase = 0) {
       const double s = 2.0 * i / columns - 1, t = double(j) / rows;
       const double flare = 0.24 + 0.30 * t;
       const double angle = std::numbers::pi * (0.52 + 0.10 * t) * s;
-      const double folds = (0.008 + 0.055 * t) * std::sin(9 * s + phase + 0.8 * t) * (0.7 + 0.3 * std::cos(4 * s + 1));
+      const double folds = (0.006 + 0.075 * t) * std::sin(15 * s + phase + 0.8 * t) * (0.7 + 0.3 * std::cos(4 * s + 1));
       const double r = flare + folds;
       const Vec3 p(1.08 * r * std::sin(angle), 1.47 - 1.32 * t - 0.07 * (1 - t) * s * s,
                    -0.75 * r * std::cos(angle) - 0.10 * t * t);
@@ -105,7 +105,7 @@ inline Cape cape(int columns = 60, int rows = 80, double phase = 0) {
 inline Material cape_cloth() {
   Material cloth;
   cloth.kind = Material::Kind::Cloth;
-  cloth.color = {0.40, 0.018, 0.022};
+  cloth.color = {0.26, 0.008, 0.012};
   return cloth;
 }
 
