@@ -104,6 +104,8 @@ class Body {
   /// earlier frames have not been simulated yet; pins move over [t0, t1].
   virtual void begin_frame(double seconds, double waiting, double t0, double t1) = 0;
   virtual StepReport advance(const Tick& tick) = 0;
+  /// Another body failed in this tick: back to the state before it.
+  virtual void take_back() = 0;
   /// Global damping: free velocities times `factor`.
   virtual void damp(double factor) = 0;
 

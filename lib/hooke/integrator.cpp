@@ -170,7 +170,9 @@ SolveResult Integrator<S>::run(const Implicit& scheme, Dynamics<S>& dynamics, Po
     dynamics.acceleration(end, u, t + h, acceleration_);
     out = v + step * acceleration_ - u;
     for (int k = 0; k < 3; ++k) out.col(k) = (inverse_mass == S(0)).select(S(0), out.col(k));
-    return out.size() ? double(out.abs().maxCoeff()) : 0.0;
+    if (out.size() == 0) return 0.0;
+    // A maximum may pass over a NaN.
+    return out.allFinite() ? double(out.abs().maxCoeff()) : std::numeric_limits<double>::quiet_NaN();
   };
   stage_v_ = v;
   double residual = miss(stage_v_, stage_x_, right_);

@@ -1,8 +1,10 @@
 #include <hooke/method.hpp>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <limits>
+#include <numbers>
 #include <stdexcept>
 
 namespace hooke {
@@ -65,11 +67,19 @@ const Method& method_named(std::string_view name) {
 
 double largest_stable_step(const Method& method, double omega, double gamma) {
   if (method.stability_limit == kAlways || (omega == 0 && gamma == 0)) return kAlways;
-  if (method.stability_limit == 0) return omega == 0 ? 2 / gamma : gamma / (omega * omega);
+  // |1 + hλ| ≤ 1 for complex pairs gives γ/ω², for real ones 2/γ at worst.
+  if (method.stability_limit == 0) return omega == 0 ? 2 / gamma : std::min(gamma / (omega * omega), 2 / gamma);
   const double limit = method.stability_limit;
-  if (std::holds_alternative<RungeKutta>(method.scheme)) return limit / std::max(omega, gamma);
-  // h²ω² + 2hγ = limit², written so that neither ω = 0 nor γ = 0 divides by zero.
-  return limit * limit / (gamma + std::sqrt(gamma * gamma + limit * limit * omega * omega));
+  if (std::holds_alternative<RungeKutta>(method.scheme)) {
+    // Little damping turns hλ to where the region bulges; more turns it to where it is narrowest.
+    constexpr double kHalfDisc = 2.615 / (2 * std::numbers::sqrt2);
+    return gamma <= 0.6 * omega ? limit / omega : kHalfDisc * limit / std::max(omega, gamma);
+  }
+  // h²ω² + phγ = limit², written so that neither ω = 0 nor γ = 0 divides by zero. A predicted
+  // velocity answers to the last acceleration, which doubles what damping costs.
+  const auto* splitting = std::get_if<Splitting>(&method.scheme);
+  const double g = splitting && splitting->kick.size() == 1 ? gamma : 2 * gamma;
+  return limit * limit / (g + std::sqrt(g * g + limit * limit * omega * omega));
 }
 
 }  // namespace hooke

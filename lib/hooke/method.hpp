@@ -80,12 +80,15 @@ std::span<const Method* const> methods();
 /// The method of that name. Throws std::invalid_argument that lists the names there are.
 const Method& method_named(std::string_view name);
 
-/// The largest stable step [s] for undamped frequencies up to `omega` [rad/s] and damping
-/// rates up to `gamma` [1/s] (the largest eigenvalue of M⁻¹D). Infinity where any step is
-/// stable; 0 where no step is.
+/// The largest stable step [s] for undamped frequencies up to `omega` [rad/s] that are damped
+/// at the rate `gamma` [1/s] (the largest eigenvalue of M⁻¹D; ζ = γ/2ω). Infinity where any
+/// step is stable; 0 where no step is.
 ///
-/// Splittings with forces of the old or predicted velocity: h²ω² + 2hγ ≤ limit²;
-/// explicit Euler: h ≤ γ/ω²; Runge-Kutta: h·max(ω, γ) ≤ limit.
+/// Semi-implicit Euler, damping at the old velocity: h²ω² + 2hγ ≤ 4. Verlet and velocity
+/// Verlet, damping at the predicted velocity: h²ω² + 4hγ ≤ 4. Both exact. Explicit Euler:
+/// h ≤ min(γ/ω², 2/γ), exact for ζ ≤ 1/√2 and within a factor 2 up to critical damping; safe for
+/// RK2, whose region contains explicit Euler's. RK4: hω ≤ 2√2 for ζ ≤ 0.3, else
+/// h·max(ω, γ) ≤ 2.615, the largest half-disc inside its region.
 double largest_stable_step(const Method& method, double omega, double gamma);
 
 }  // namespace hooke

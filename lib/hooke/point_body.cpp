@@ -14,6 +14,8 @@ namespace {
 constexpr double kStepSafety = 0.9;
 // How often the automatic step is looked at again [s].
 constexpr double kEstimateInterval = 1.0 / 30;
+// Positions and velocities below this never make a force overflow by themselves.
+constexpr double kOrdinary = 1e9;
 // Methods without a stable step still need one: ω h of this.
 constexpr double kUnstablePhase = 0.05;
 
@@ -217,6 +219,15 @@ void PointBody<S>::acceleration(const Points<S>& x, const Points<S>& v, double t
     if (g != 0) a.col(k) += (points_.inverse_mass > S(0)).select(Values<S>::Constant(x.rows(), g), S(0));
   }
   if (pushing_) a += push_acceleration_;
+  if (watching_ && culprit_ < 0) {
+    for (Index i = 0; i < size() && culprit_ < 0; ++i)
+      if (!x.row(i).allFinite() || !v.row(i).allFinite()) culprit_ = i;
+    for (Index i = 0; i < size() && culprit_ < 0; ++i)
+      if (!a.row(i).allFinite()) {
+        culprit_ = i;
+        fields_at_fault_ = double(x.abs().maxCoeff()) < kOrdinary && double(v.abs().maxCoeff()) < kOrdinary;
+      }
+  }
 }
 
 template <class S>
@@ -258,13 +269,19 @@ void PointBody<S>::add_implicit_times(const Points<S>& x, const Points<S>& v, S 
 }
 
 template <class S>
-double PointBody<S>::stable_step() const {
+typename ForceField<S>::Rates PointBody<S>::rate_bounds() const {
   typename ForceField<S>::Rates rates;
   for (const auto& field : fields_) {
     const auto more = field->rate_bounds(points_.position, points_.velocity, points_.inverse_mass);
     rates.omega_squared += more.omega_squared;
     rates.gamma += more.gamma;
   }
+  return rates;
+}
+
+template <class S>
+double PointBody<S>::stable_step() const {
+  const auto rates = rate_bounds();
   return largest_stable_step(*settings_.method, std::sqrt(rates.omega_squared), rates.gamma);
 }
 
@@ -279,10 +296,11 @@ void PointBody<S>::choose_substeps(const Tick& tick) {
     if (settings_.method->stability_limit == 0) {
       // No step is stable undamped; a small phase per step keeps the growth slow.
       const double omega_step = kUnstablePhase * largest_stable_step(semi_implicit_euler(), 1, 0) / 2;
-      double omega2 = 0;
-      for (const auto& field : fields_)
-        omega2 += field->rate_bounds(points_.position, points_.velocity, points_.inverse_mass).omega_squared;
-      if (omega2 > 0) wanted_dt_ = std::max(wanted_dt_, omega_step / std::sqrt(omega2));
+      const auto rates = rate_bounds();
+      // Heavy damping has a limit of its own, which the phase must not pass.
+      const double damped = largest_stable_step(*settings_.method, 0, rates.gamma);
+      if (rates.omega_squared > 0)
+        wanted_dt_ = std::max(wanted_dt_, std::min(omega_step / std::sqrt(rates.omega_squared), kStepSafety * damped));
     }
   }
   const double count = std::ceil(length / wanted_dt_ - 1e-9);
@@ -295,17 +313,49 @@ SolveResult PointBody<S>::substep(double t, double h) {
   return integrator_.step(*this, points_.position, points_.velocity, t, h);
 }
 
+// All substeps of tick_, or those up to the one that fails.
 template <class S>
-StepReport PointBody<S>::failure(StepReport::Status status, Index point, double time) const {
+SolveResult PointBody<S>::run_tick() {
+  const double length = tick_.end - tick_.start;
+  integrator_.restart();
+  if (settings_.collides && !tick_.colliders.empty())
+    contacts_.begin_tick(tick_.colliders, points_, tick_.start, tick_.end, settings_.thickness);
+  SolveResult solve;
+  for (Index i = 0; i < substeps_ && solve.converged; ++i) {
+    const double t = tick_.start + length * double(i) / double(substeps_);
+    solve = substep(t, length / double(substeps_));
+  }
+  return solve;
+}
+
+// What went wrong in tick_, and the state from before it. NaN spreads from point to point
+// within a tick, so the tick is run again under watch for where it came from.
+template <class S>
+StepReport PointBody<S>::explain(bool finite) {
   StepReport report;
-  report.status = status;
   report.body = name();
-  report.point = point;
-  report.time = time;
+  report.time = tick_.start;
+  Index broken = -1;
+  for (Index i = 0; i < size() && broken < 0; ++i)
+    if (!points_.position.row(i).allFinite() || !points_.velocity.row(i).allFinite()) broken = i;
+  take_back();
+  watching_ = true, culprit_ = -1, fields_at_fault_ = false;
+  run_tick();
+  watching_ = false;
+  take_back();
+  const bool solver_failed = finite && !fields_at_fault_;
+  report.status = solver_failed ? StepReport::Status::NotConverged : StepReport::Status::NotFinite;
+  if (!solver_failed) report.point = culprit_ >= 0 ? culprit_ : broken;
+  if (fields_at_fault_) {
+    report.advice = "the force on it was not finite at ordinary positions and velocities; check its force fields";
+    return report;
+  }
   const double stable = stable_step();
+  const std::string limit = stable == 0               ? "0 (none undamped)"
+                            : std::isfinite(stable) ? std::to_string(1e3 * stable) + " ms"
+                                                    : "without bound";
   report.advice = "the substep was " + std::to_string(1e3 * (tick_.end - tick_.start) / double(substeps_)) +
-                  " ms, the largest stable one of " + std::string(settings_.method->name) + " is " +
-                  (stable > 0 ? std::to_string(1e3 * stable) + " ms" : "0 (none undamped)") +
+                  " ms, the largest stable one of " + std::string(settings_.method->name) + " is " + limit +
                   "; lower dt, lower the stiffness or choose another method";
   return report;
 }
@@ -316,31 +366,22 @@ StepReport PointBody<S>::advance(const Tick& tick) {
   previous_position_ = points_.position;
   previous_velocity_ = points_.velocity;
   if (size() == 0) return {};
-  const double length = tick.end - tick.start;
   choose_substeps(tick);
-  spend_bank(length);
-  integrator_.restart();
-  if (settings_.collides && !tick.colliders.empty())
-    contacts_.begin_tick(tick.colliders, points_, tick.start, tick.end, settings_.thickness);
-  SolveResult solve;
-  for (Index i = 0; i < substeps_ && solve.converged; ++i) {
-    const double t = tick.start + length * double(i) / double(substeps_);
-    solve = substep(t, length / double(substeps_));
-  }
+  spend_bank(tick.end - tick.start);
+  const SolveResult solve = run_tick();
+  const bool finite = points_.position.allFinite() && points_.velocity.allFinite();
+  if (!finite || !solve.converged) return explain(finite);
   if (!moving_.empty() && tick.end >= frame_end_) {
     for (const Moving& pin : moving_) points_.velocity.row(pin.point).setZero();
     moving_.clear();
   }
-  const bool finite = points_.position.allFinite() && points_.velocity.allFinite();
-  if (finite && solve.converged) return {};
+  return {};
+}
 
-  Index bad = -1;
-  if (!finite)
-    for (Index i = 0; i < size() && bad < 0; ++i)
-      if (!points_.position.row(i).allFinite() || !points_.velocity.row(i).allFinite()) bad = i;
+template <class S>
+void PointBody<S>::take_back() {
   points_.position = previous_position_;
   points_.velocity = previous_velocity_;
-  return failure(finite ? StepReport::Status::NotConverged : StepReport::Status::NotFinite, bad, tick.start);
 }
 
 template <class S>

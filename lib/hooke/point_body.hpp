@@ -59,6 +59,7 @@ class PointBody : public Body, protected Dynamics<S> {
   Vec3 momentum() const override;
   void begin_frame(double seconds, double waiting, double t0, double t1) override;
   StepReport advance(const Tick& tick) override;
+  void take_back() override;
   void damp(double factor) override;
 
  protected:
@@ -99,10 +100,12 @@ class PointBody : public Body, protected Dynamics<S> {
     Vec3 from, to;  // world
   };
 
+  typename ForceField<S>::Rates rate_bounds() const;
   void choose_substeps(const Tick& tick);
   void spend_bank(double seconds);
   void hold(Index point);
-  StepReport failure(StepReport::Status status, Index point, double time) const;
+  SolveResult run_tick();
+  StepReport explain(bool finite);
 
   MotionSettings settings_;
   Integrator<S> integrator_;
@@ -119,6 +122,11 @@ class PointBody : public Body, protected Dynamics<S> {
   double frame_start_ = 0, frame_end_ = 0;
   Index substeps_ = 0;
   double wanted_dt_ = 0, last_estimate_ = -1;
+
+  // While a failed tick is run once more to find out what went wrong.
+  bool watching_ = false;
+  Index culprit_ = -1;          // the first point with a force or place that is not finite
+  bool fields_at_fault_ = false;  // its force came from ordinary positions and velocities
 };
 
 extern template class PointBody<float>;

@@ -70,8 +70,13 @@ StepReport World::step() {
   const Tick tick{clock_.time(), clock_.time_at(clock_.ticks() + 1), gravity(), colliders_};
   reports_.assign(bodies_.size(), {});
   for_each_body([&](Body& body, std::size_t i) { reports_[i] = body.advance(tick); });
-  for (const StepReport& report : reports_)
-    if (!report.good()) return report;
+  for (const StepReport& report : reports_) {
+    if (report.good()) continue;
+    for_each_body([&](Body& body, std::size_t i) {
+      if (reports_[i].good()) body.take_back();
+    });
+    return report;
+  }
   if (damping_ > 0) {
     const double factor = std::pow(1 - damping_, tick.end - tick.start);
     for_each_body([&](Body& body, std::size_t) { body.damp(factor); });

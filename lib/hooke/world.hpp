@@ -51,7 +51,7 @@ class World {
   void clear_forces();
 
   /// Moves everything by a frame of any length: as many whole ticks as there is room for; the
-  /// rest waits. Stops at the first tick that fails and keeps the last good state.
+  /// rest waits. Stops at the first tick that fails; every body keeps its state of before that tick.
   StepReport update(double frame_seconds);
 
   const Clock& clock() const { return clock_; }
