@@ -34,7 +34,10 @@ void StateTable::add(std::string_view body, const Points<double>& x, const Point
 
 NumberTable::NumberTable(const std::filesystem::path& path, std::vector<std::string> columns)
     : file_(path, OutputFile::Leftover::Keep), columns_(columns.size()) {
-  for (std::size_t i = 0; i < columns.size(); ++i) file_.write((i ? "," : "") + csv_field(columns[i]));
+  for (std::size_t i = 0; i < columns.size(); ++i) {
+    if (i) file_.write(",");
+    file_.write(csv_field(columns[i]));
+  }
   file_.write("\n");
   file_.flush();
 }

@@ -1,0 +1,345 @@
+#include <scene/scene.hpp>
+
+#include <hooke/error.hpp>
+#include <hooke/io/mesh_file.hpp>
+#include <hooke/point_body.hpp>
+
+#include <algorithm>
+#include <stdexcept>
+
+namespace hooke::scene {
+
+namespace {
+
+using softbody::Family;
+
+[[noreturn]] void fail(const SceneDescription& scene, const std::string& path, const std::string& rule) {
+  throw Error(scene.file + ": " + path + ": " + rule);
+}
+
+// What the library objects to, told with the place in the file.
+template <class Work>
+auto told_at(const SceneDescription& scene, const std::string& path, const Work& work) {
+  try {
+    return work();
+  } catch (const Error& error) {
+    fail(scene, path, error.what());
+  } catch (const std::invalid_argument& error) {
+    fail(scene, path, error.what());
+  } catch (const std::out_of_range& error) {
+    fail(scene, path, error.what());
+  }
+}
+
+// Wind whose clock starts with the first shown frame.
+template <class S>
+class ShownWind final : public ForceField<S> {
+ public:
+  ShownWind(const softbody::Wind& wind, const std::vector<Triangle>& triangles, Index count, double preroll)
+      : wind_(wind, triangles, count), preroll_(preroll) {}
+  bool uses_velocity() const override { return wind_.uses_velocity(); }
+  void add_force(const Points<S>& x, const Points<S>& v, double t, Points<S>& f) const override {
+    wind_.add_force(x, v, t - preroll_, f);
+  }
+  void add_damping_times(const Points<S>& x, const Points<S>& v, const Points<S>& d, Points<S>& out) const override {
+    wind_.add_damping_times(x, v, d, out);
+  }
+  typename ForceField<S>::Rates rate_bounds(const Points<S>& x, const Points<S>& v,
+                                            const Values<S>& inverse_mass) const override {
+    return wind_.rate_bounds(x, v, inverse_mass);
+  }
+
+ private:
+  softbody::WindField<S> wind_;
+  double preroll_;
+};
+
+template <class S>
+bool add_wind(Body& body, const softbody::Wind& wind, const std::vector<Triangle>& triangles, double preroll) {
+  auto* points = dynamic_cast<PointBody<S>*>(&body);
+  if (points) points->add_field(std::make_unique<ShownWind<S>>(wind, triangles, body.size(), preroll));
+  return points != nullptr;
+}
+
+softbody::Cloth cloth_of(const Grid& grid, const Material& material) {
+  const auto make = [&](const softbody::ClothMaterial& cloth) {
+    return softbody::cloth_from_grid(grid.width, grid.height, grid.columns, grid.rows, grid.right, grid.down, cloth);
+  };
+  if (const auto* cloth = std::get_if<softbody::ClothMaterial>(&material)) return make(*cloth);
+
+  // The same points, springs and triangles with other numbers.
+  const auto& fixed = std::get<FixedMaterial>(material);
+  softbody::ClothMaterial any;
+  any.stretch = any.shear = any.bend = 1;
+  softbody::Cloth cloth = make(any);
+  cloth.masses.setConstant(fixed.mass / double(cloth.masses.size()));
+  auto network = std::make_shared<softbody::SpringNetwork>();
+  for (softbody::Spring spring : cloth.network->springs) {
+    spring.stiffness = spring.family == Family::Stretch ? fixed.structural
+                       : spring.family == Family::Shear ? fixed.shear
+                                                        : fixed.bend;
+    spring.damping = fixed.damping;
+    if (spring.stiffness > 0) network->springs.push_back(spring);
+  }
+  cloth.network = std::move(network);
+  return cloth;
+}
+
+struct Lattice {
+  int columns = 0, rows = 0;  // 0: none
+};
+
+void choose_points(const SceneDescription& scene, const std::string& path, const std::vector<PointChoice>& choices,
+                   Index count, const Lattice& lattice, std::vector<Index>& out) {
+  for (std::size_t i = 0; i < choices.size(); ++i) {
+    const std::string here = path + "[" + std::to_string(i) + "]";
+    if (const auto* index = std::get_if<Index>(&choices[i])) {
+      if (*index >= count)
+        fail(scene, here, "must be below the point count " + std::to_string(count) + ", got " + std::to_string(*index));
+      out.push_back(*index);
+      continue;
+    }
+    const std::string& name = std::get<std::string>(choices[i]);
+    if (lattice.rows == 0) fail(scene, here, "only grids and capes have edges, got \"" + name + "\"");
+    const auto on = [&](const char* side) { return name.find(side) != std::string::npos; };
+    for (int row = 0; row < lattice.rows; ++row)
+      for (int column = 0; column < lattice.columns; ++column)
+        if ((!on("top") || row == 0) && (!on("bottom") || row == lattice.rows - 1) && (!on("left") || column == 0) &&
+            (!on("right") || column == lattice.columns - 1))
+          out.push_back(Index(row) * lattice.columns + column);
+  }
+  std::vector<Index> once;
+  std::vector<bool> seen(std::size_t(count), false);
+  for (const Index point : out) {
+    if (!seen[std::size_t(point)]) once.push_back(point);
+    seen[std::size_t(point)] = true;
+  }
+  out = std::move(once);
+}
+
+void lay_out_uv(const Lattice& lattice, double width, double height, SceneBody& out) {
+  out.uv.resize(Index(lattice.columns) * lattice.rows, 2);
+  for (int row = 0; row < lattice.rows; ++row)
+    for (int column = 0; column < lattice.columns; ++column)
+      out.uv.row(Index(row) * lattice.columns + column) << double(column) / (lattice.columns - 1) * width,
+          double(row) / (lattice.rows - 1) * height;
+}
+
+class Builder {
+ public:
+  Builder(const SceneDescription& description, const Scene* reuse)
+      : d_(description), reuse_(reuse), scene_{World(description.tick_rate), description, {}, {}} {}
+
+  Scene run() {
+    scene_.world.set_gravity(d_.gravity);
+    scene_.world.set_damping(d_.damping);
+    for (const ColliderDescription& collider : d_.colliders)
+      told_at(d_, collider.path, [&] { add_collider(collider); });
+    for (const SoftBody& body : d_.bodies) add_body(body);
+    return std::move(scene_);
+  }
+
+ private:
+  void add_collider(const ColliderDescription& description) {
+    Collider collider;
+    collider.name = description.name;
+    collider.friction = description.friction;
+    collider.restitution = description.restitution;
+    if (const auto* solid = std::get_if<MovingShape>(&description.solid)) {
+      collider.shapes = {solid->shape};
+      if (solid->motion) collider.motion = move_shape(*solid);
+    } else {
+      add_human(description, collider);
+    }
+    scene_.world.add_collider(std::move(collider));
+  }
+
+  std::function<void(double, std::span<Shape>)> move_shape(const MovingShape& solid) const {
+    return [start = solid.shape, drive = *solid.motion, preroll = d_.preroll](double t, std::span<Shape> shapes) {
+      const Vec3 offset = drive.offset(t - preroll);
+      shapes[0] = start;
+      if (auto* sphere = std::get_if<Sphere>(&shapes[0])) sphere->center += offset;
+      if (auto* capsule = std::get_if<Capsule>(&shapes[0])) {
+        capsule->a += offset;
+        capsule->b += offset;
+      }
+    };
+  }
+
+  void add_human(const ColliderDescription& description, Collider& collider) {
+    const auto& settings = std::get<human::HumanSettings>(description.solid);
+    if (!std::filesystem::exists(settings.motion))
+      throw Error("there is no motion file " + settings.motion.string() +
+                  "; the recorded walk is in the Debian package assimp-testmodels (apt-get install assimp-testmodels)");
+    const double needed = settings.hold + settings.blend_in;
+    if (d_.preroll < needed - 1e-9)
+      throw Error("the human stands still and begins to walk before the first frame: preroll must be at least hold + "
+                  "blend_in = " + std::to_string(needed) + " s, got " + std::to_string(d_.preroll) + " s");
+    const std::size_t number = scene_.humans.size();
+    const human::Human human =
+        reuse_ && number < reuse_->humans.size() ? reuse_->humans[number].human : human::Human(settings);
+    scene_.humans.push_back({description.name, human, scene_.world.colliders().size()});
+    std::vector<Capsule> capsules(std::size_t(human.capsule_count()));
+    human.capsules(-d_.preroll, capsules);
+    collider.shapes.assign(capsules.begin(), capsules.end());
+    collider.motion = [human, preroll = d_.preroll](double t, std::span<Shape> shapes) {
+      thread_local std::vector<Capsule> now;
+      now.resize(shapes.size());
+      human.capsules(t - preroll, now);
+      std::copy(now.begin(), now.end(), shapes.begin());
+    };
+  }
+
+  void add_body(const SoftBody& description) {
+    SceneBody out;
+    softbody::SoftBodySettings settings;
+    Lattice lattice;
+    std::optional<Cape> cape;
+    if (const auto* raw = std::get_if<RawPoints>(&description.form)) {
+      settings.positions = raw->points;
+      settings.velocities = raw->velocities;
+      settings.masses = raw->masses;
+      settings.network = std::make_shared<const softbody::SpringNetwork>(raw->network);
+      settings.pins = raw->pins;
+    } else if (const auto* grid = std::get_if<Grid>(&description.form)) {
+      settings = told_at(d_, description.path, [&] { return softbody::settings_of(cloth_of(*grid, description.material)); });
+      lattice = {grid->columns, grid->rows};
+      lay_out_uv(lattice, grid->width, grid->height, out);
+    } else if (const auto* mesh = std::get_if<MeshFile>(&description.form)) {
+      settings = told_at(d_, description.path + ".mesh", [&] {
+        return softbody::settings_of(
+            softbody::cloth_from_mesh(io::read_obj(mesh->file), std::get<softbody::ClothMaterial>(description.material)));
+      });
+    } else {
+      const auto& cut = std::get<CapeCut>(description.form);
+      cape = dress_human(description, cut, out);
+      settings = softbody::settings_of(cape->cloth);
+      lattice = {cut.columns, cut.rows};
+      lay_out_uv(lattice, cut.width, cut.height, out);
+    }
+    settings.name = description.name;
+    settings.origin = description.origin;
+    const Index count = settings.positions.rows();
+    choose_points(d_, description.path + ".pin", description.pin, count, lattice, settings.pins);
+    settings.linear_drag = description.linear_drag;
+    settings.quadratic_drag = description.quadratic_drag;
+    settings.motion.thickness = description.thickness;
+    settings.motion.dt = description.solver.dt;
+    settings.motion.method = &method_named(description.solver.method);
+    settings.precision = description.solver.precision;
+
+    std::unique_ptr<Body> body = told_at(d_, description.path, [&] {
+      std::unique_ptr<Body> made = softbody::make_soft_body(settings);
+      if (description.wind &&
+          !(add_wind<float>(*made, *description.wind, settings.triangles, d_.preroll) ||
+            add_wind<double>(*made, *description.wind, settings.triangles, d_.preroll)))
+        throw Error("this body takes no wind");
+      return made;
+    });
+    out.triangles = settings.triangles;
+    out.network = settings.network;
+    out.rest = softbody::rest_lengths(*settings.network, settings.positions);
+    out.thickness = description.thickness;
+    out.color = description.color;
+    out.inside_color = description.inside_color;
+    if (cape) wear(*cape, out);
+    drive_pins(description, lattice, *body, out);
+    if (!out.driven.empty())
+      told_at(d_, description.path + ".pin_motion", [&] { body->drive_pins(out.driven, out.targets); });
+    out.held.resize(std::size_t(count));
+    for (Index i = 0; i < count; ++i) out.held[std::size_t(i)] = body->pinned(i);
+    out.body = body.get();
+    scene_.world.add(std::move(body));
+    scene_.bodies.push_back(std::move(out));
+  }
+
+  Cape dress_human(const SoftBody& description, const CapeCut& cut, SceneBody& out) {
+    const auto found = std::find_if(scene_.humans.begin(), scene_.humans.end(),
+                                    [&](const SceneHuman& human) { return human.name == cut.human; });
+    if (found == scene_.humans.end())
+      fail(d_, description.path + ".cape.human", "there is no human collider called \"" + cut.human + "\"");
+    out.wears = int(found - scene_.humans.begin());
+    CapeSettings settings;
+    settings.width = cut.width;
+    settings.height = cut.height;
+    settings.columns = cut.columns;
+    settings.rows = cut.rows;
+    settings.thickness = description.thickness;
+    settings.material = std::get<softbody::ClothMaterial>(description.material);
+    return told_at(d_, description.path + ".cape", [&] { return dress(found->human, settings, -d_.preroll); });
+  }
+
+  void wear(const Cape& cape, SceneBody& out) {
+    out.driven = cape.pins;
+    out.targets = [human = scene_.humans[std::size_t(out.wears)].human, attachment = cape.attachment,
+                   preroll = d_.preroll](double t, Points<double>& places) {
+      human.attached(attachment, t - preroll, places);
+    };
+  }
+
+  void drive_pins(const SoftBody& description, const Lattice& lattice, const Body& body, SceneBody& out) {
+    if (description.pin_motion.empty()) return;
+    if (out.wears >= 0) fail(d_, description.path + ".pin_motion", "a cape hangs on its human");
+    struct Driven {
+      Vec3 start;
+      std::size_t group;
+    };
+    std::vector<Driven> driven;
+    std::vector<Drive> drives;
+    std::vector<bool> taken(std::size_t(body.size()), false);
+    const Points<double> start = body.positions();
+    for (std::size_t g = 0; g < description.pin_motion.size(); ++g) {
+      const std::string path = description.path + ".pin_motion[" + std::to_string(g) + "].points";
+      std::vector<Index> points;
+      choose_points(d_, path, description.pin_motion[g].points, body.size(), lattice, points);
+      for (const Index point : points) {
+        if (taken[std::size_t(point)]) fail(d_, path, "point " + std::to_string(point) + " is driven by two groups");
+        taken[std::size_t(point)] = true;
+        out.driven.push_back(point);
+        driven.push_back({start.row(point).matrix().transpose(), g});
+      }
+      drives.push_back(description.pin_motion[g].drive);
+    }
+    out.targets = [driven, drives, preroll = d_.preroll](double t, Points<double>& places) {
+      for (std::size_t i = 0; i < driven.size(); ++i)
+        places.row(Index(i)) = (driven[i].start + drives[driven[i].group].offset(t - preroll)).transpose().array();
+    };
+  }
+
+  const SceneDescription& d_;
+  const Scene* reuse_;
+  Scene scene_;
+};
+
+template <class S>
+bool facts(const Body& body, const char* precision, MotionFacts& out) {
+  const auto* points = dynamic_cast<const PointBody<S>*>(&body);
+  if (!points) return false;
+  out = {std::string(points->settings().method->name), precision, points->substeps(), points->stable_step(),
+         points->settings().dt};
+  return true;
+}
+
+}  // namespace
+
+Scene build(const SceneDescription& description, const Scene* reuse) { return Builder(description, reuse).run(); }
+
+void override_solver(SceneDescription& description, const std::string& method, double dt, const std::string& precision) {
+  if (!method.empty()) method_named(method);
+  if (!precision.empty() && precision != "float" && precision != "double")
+    throw Error("there is no precision \"" + precision + "\"; there are float, double");
+  for (SoftBody& body : description.bodies) {
+    if (!method.empty()) body.solver.method = method;
+    if (dt > 0) body.solver.dt = dt;
+    if (!precision.empty())
+      body.solver.precision = precision == "float" ? softbody::Precision::Float : softbody::Precision::Double;
+  }
+}
+
+MotionFacts motion_facts(const Body& body) {
+  MotionFacts out;
+  facts<float>(body, "float", out) || facts<double>(body, "double", out);
+  return out;
+}
+
+}  // namespace hooke::scene

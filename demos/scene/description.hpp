@@ -1,0 +1,117 @@
+// What a scene file says, as plain data: one struct an object of the file, its members named
+// like the keys and holding their defaults. Units and meaning of every key: docs/scene-files.md.
+#pragma once
+
+#include <hooke/softbody/soft_body.hpp>
+#include <scene/cape.hpp>
+
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <variant>
+#include <vector>
+
+namespace hooke::scene {
+
+/// Where something driven is, relative to its start, in shown time. Before time 0 it stands still.
+struct Key {
+  double time = 0;         ///< [s]
+  Vec3 offset{0, 0, 0};    ///< [m]
+};
+struct Drive {
+  Vec3 translate{0, 0, 0};  ///< [m/s]
+  Vec3 swing{0, 0, 0};      ///< amplitude of a sine [m]
+  double period = 1;        ///< of the sine [s]
+  std::vector<Key> keys;    ///< instead of the above: a smooth path through these
+
+  Vec3 offset(double t) const;  ///< [m]; a function of time alone
+};
+
+/// Points by index or as an edge of a grid ("top", "bottom-left", …).
+using PointChoice = std::variant<Index, std::string>;
+
+struct PinDrive {
+  std::vector<PointChoice> points;
+  Drive drive;
+};
+
+struct RawPoints {
+  Points<double> points{0, 3};
+  Points<double> velocities{0, 3};
+  Values<double> masses;
+  softbody::SpringNetwork network;
+  std::vector<Index> pins;
+};
+struct Grid {
+  double width = 1, height = 1;  ///< "size"
+  int columns = 2, rows = 2;     ///< "points"
+  Vec3 right{1, 0, 0}, down{0, -1, 0};
+};
+struct MeshFile {
+  std::filesystem::path file;
+};
+struct CapeCut {
+  std::string human;             ///< name of a human collider
+  double width = 0.9, height = 1.2;
+  int columns = 60, rows = 80;
+};
+
+/// Springs with fixed constants on a grid of equal masses: the classical mass-spring sheet.
+struct FixedMaterial {
+  double mass = 1;                               ///< total [kg]
+  double structural = 0, shear = 0, bend = 0;    ///< "stiffness" of each spring [N/m]
+  double damping = 0;                            ///< of each spring [N·s/m]
+};
+using Material = std::variant<softbody::ClothMaterial, FixedMaterial>;
+
+struct Solver {
+  std::string method = "velocity-verlet";
+  double dt = 0;  ///< [s]; 0: automatic
+  softbody::Precision precision = softbody::Precision::Float;
+};
+
+struct SoftBody {
+  std::string name;
+  std::string path;  ///< in the file, for messages: bodies[0]
+  Vec3 origin{0, 0, 0};
+  std::variant<RawPoints, Grid, MeshFile, CapeCut> form;
+  Material material;
+  std::vector<PointChoice> pin;
+  std::vector<PinDrive> pin_motion;
+  std::optional<softbody::Wind> wind;  ///< times as shown
+  double linear_drag = 0, quadratic_drag = 0;
+  double thickness = 0;
+  std::optional<Vec3> color, inside_color;
+  Solver solver;
+};
+
+struct MovingShape {
+  Shape shape;
+  std::optional<Drive> motion;
+};
+struct ColliderDescription {
+  std::string name;
+  std::string path;
+  std::variant<MovingShape, human::HumanSettings> solid;
+  double friction = 0.3, restitution = 0;
+  std::optional<Vec3> color;
+};
+
+struct CameraDescription {
+  Vec3 eye{0, 1.3, 5}, target{0, 0.9, 0};
+  double fov = 30;  ///< [degrees]
+};
+
+struct SceneDescription {
+  std::string file;   ///< what messages call it
+  std::string title;  ///< one line, may be empty
+  Vec3 gravity{0, -9.81, 0};
+  double damping = 0;
+  double duration = 2, frame_rate = 60, tick_rate = 240, preroll = 0;
+  double poster = -1;  ///< moment of a still picture [s]; < 0: the middle
+  std::vector<SoftBody> bodies;
+  std::vector<ColliderDescription> colliders;
+  std::optional<CameraDescription> camera;
+};
+
+}  // namespace hooke::scene

@@ -1,0 +1,85 @@
+#include <scene/library.hpp>
+
+#include <hooke/error.hpp>
+#include <scene/parse.hpp>
+
+#include <algorithm>
+#include <array>
+#include <filesystem>
+
+namespace hooke::scene {
+
+namespace {
+
+constexpr std::array kSheets{32, 64, 128};
+const std::string kSheetName = "hanging-sheet-";
+
+// Where scene files are: beside the source, else where an installed command finds its share.
+std::vector<std::filesystem::path> scene_folders() {
+  std::vector<std::filesystem::path> out;
+  std::error_code error;
+  const auto add = [&](const std::filesystem::path& folder) {
+    if (std::filesystem::is_directory(folder, error)) out.push_back(folder);
+  };
+  add(HOOKE_SCENE_SOURCE_FOLDER);
+  const std::filesystem::path program = std::filesystem::read_symlink("/proc/self/exe", error);
+  if (!error) add(program.parent_path().parent_path() / HOOKE_SCENE_SHARE_FOLDER);
+  return out;
+}
+
+std::filesystem::path file_of(const std::string& name) {
+  std::error_code error;
+  if (name.find('/') != std::string::npos) return {};
+  for (const auto& folder : scene_folders())
+    if (const auto path = folder / (name + ".json"); std::filesystem::is_regular_file(path, error)) return path;
+  return {};
+}
+
+}  // namespace
+
+SceneDescription hanging_sheet(int n) {
+  SceneDescription scene;
+  scene.file = kSheetName + std::to_string(n);
+  scene.title = "Hanging sheet, " + std::to_string(n) + " x " + std::to_string(n) + " points";
+  scene.duration = 0.5;
+  SoftBody sheet;
+  sheet.name = "sheet";
+  sheet.path = "bodies[0]";
+  sheet.form = Grid{1, 1, n, n, {1, 0, 0}, {0, -1, 1}};
+  sheet.material = FixedMaterial{0.3, 500, 100, 5, 0};
+  sheet.pin = {"top"};
+  scene.bodies.push_back(std::move(sheet));
+  return scene;
+}
+
+std::vector<NamedScene> named_scenes() {
+  std::vector<NamedScene> out;
+  for (const int n : kSheets) out.push_back({kSheetName + std::to_string(n), hanging_sheet(n).title});
+  for (const auto& folder : scene_folders())
+    for (const auto& entry : std::filesystem::directory_iterator(folder)) {
+      if (entry.path().extension() != ".json") continue;
+      const std::string name = entry.path().stem();
+      if (std::any_of(out.begin(), out.end(), [&](const NamedScene& scene) { return scene.name == name; })) continue;
+      try {
+        out.push_back({name, read_scene(entry.path()).title});
+      } catch (const Error& error) {
+        out.push_back({name, error.what()});
+      }
+    }
+  std::sort(out.begin(), out.end(), [](const NamedScene& a, const NamedScene& b) { return a.name < b.name; });
+  return out;
+}
+
+SceneDescription find_scene(const std::string& path_or_name) {
+  std::error_code error;
+  if (std::filesystem::exists(path_or_name, error) && !std::filesystem::is_directory(path_or_name, error))
+    return read_scene(path_or_name);
+  for (const int n : kSheets)
+    if (path_or_name == kSheetName + std::to_string(n)) return hanging_sheet(n);
+  if (const auto path = file_of(path_or_name); !path.empty()) return read_scene(path);
+  std::string names;
+  for (const NamedScene& scene : named_scenes()) names += (names.empty() ? "" : ", ") + scene.name;
+  throw Error(path_or_name + ": there is no such scene file, nor a scene of that name; there are " + names);
+}
+
+}  // namespace hooke::scene
