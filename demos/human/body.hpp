@@ -32,7 +32,8 @@ struct Stance {
 struct Body {
   io::Motion motion;                  ///< [m], without the T-pose of frame 0
   io::LocalPose t_pose;               ///< upright, arms sideways, facing +z, up is +y
-  std::vector<BoneCapsule> capsules;  ///< left and right alike
+  std::vector<BoneCapsule> capsules;  ///< what others collide with, left and right alike
+  std::vector<BoneCapsule> flesh;     ///< finer ones that taper smoothly, for the skin
 };
 
 /// An athletic person of `height` [m] on the skeleton of the recording. Spine, shoulders and
@@ -43,8 +44,9 @@ Body make_body(io::Motion recording, double height);
 /// The body standing, facing +z, hips above the origin, lowest point at y = 0.
 io::LocalPose standing(const Body& body, const Stance& stance);
 
-/// World capsules of a pose. Precondition: out.size() == body.capsules.size().
-void place_capsules(const Body& body, std::span<const io::JointFrame> frames, std::span<Capsule> out);
+/// Capsules on joints, in the space of the joints. Precondition: out.size() == capsules.size().
+void place_capsules(std::span<const BoneCapsule> capsules, std::span<const io::JointFrame> frames,
+                    std::span<Capsule> out);
 
 /// Lowest and highest y [m] of capsules.
 double bottom(std::span<const Capsule> capsules);

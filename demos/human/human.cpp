@@ -32,7 +32,7 @@ std::vector<double> lowest_points(const Body& body, const io::Motion& motion) {
   for (std::size_t f = 0; f < lowest.size(); ++f) {
     io::local_pose(motion, motion.first_time + static_cast<double>(f) / motion.frame_rate, pose);
     io::global_pose(motion, pose, joints);
-    place_capsules(body, joints, capsules);
+    place_capsules(body.capsules, joints, capsules);
     lowest[f] = bottom(capsules);
   }
   return lowest;
@@ -130,7 +130,7 @@ double Human::Parts::recording_time(double t) const {
 
 void Human::Parts::pose(double t, std::span<io::JointFrame> out) const {
   io::LocalPose& local = scratch(out.size(), body.capsules.size()).pose;
-  io::local_pose(shown, t, local);
+  io::local_pose(shown, std::min(t, freeze_time), local);
   io::global_pose(shown, local, out);
 }
 
@@ -207,8 +207,8 @@ Human::Human(const HumanSettings& settings) {
   parts->freeze_time = std::round((settings.until - settings.from + settings.settle / 2) * 1e9) / 1e9;
   parts->body = make_body(io::read_motion(settings.motion), settings.height);
   io::Motion& motion = parts->body.motion;
-  require(settings.from - settings.blend_in >= motion.first_time,
-          "the recording must have begun blend_in before from", settings.from);
+  require(settings.from - settings.blend_in >= motion.first_time, "the recording must have begun blend_in before from",
+          settings.from);
   require(settings.until <= motion.last_time(), "until must lie within the recording", settings.until);
   io::low_pass(motion, settings.filter_hz);
   parts->make_shown();
@@ -238,7 +238,7 @@ void Human::pose(double t, std::span<io::JointFrame> out) const {
 void Human::capsules(double t, std::span<Capsule> out) const {
   auto& frames = scratch(joint_names().size(), out.size()).frames;
   parts_->pose(t, frames);
-  place_capsules(parts_->body, frames, out);
+  place_capsules(parts_->body.capsules, frames, out);
 }
 
 const TriangleMesh& Human::skin() const { return parts_->skinning->mesh(); }
@@ -246,7 +246,7 @@ const TriangleMesh& Human::skin() const { return parts_->skinning->mesh(); }
 void Human::skin(double t, Points<double>& vertices) const {
   Scratch& room = scratch(joint_names().size(), parts_->body.capsules.size());
   parts_->pose(t, room.frames);
-  place_capsules(parts_->body, room.frames, room.capsules);
+  place_capsules(parts_->body.capsules, room.frames, room.capsules);
   parts_->skinning->deform(room.frames, room.capsules, vertices);
 }
 

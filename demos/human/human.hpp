@@ -20,21 +20,21 @@ namespace hooke::human {
 
 struct HumanSettings {
   std::filesystem::path motion = "/usr/share/assimp/models/BVH/01_01.bvh";
-  double height = 1.75;    ///< [m] standing, crown to sole
-  double from = 4.8;       ///< [s] recording time at t = 0
-  double until = 11.65;    ///< [s] recording time of the frozen pose
-  double hold = 1.5;       ///< [s] stands at rest before moving, so that a cape can settle
-  double blend_in = 1.5;   ///< [s] from the rest pose into the recording, ends at t = 0
-  double settle = 0.3;     ///< [s] over which playback slows down to a stop
-  double filter_hz = 8;    ///< [Hz] low-pass of the recording
+  double height = 1.75;   ///< [m] standing, crown to sole
+  double from = 4.8;      ///< [s] recording time at t = 0
+  double until = 11.65;   ///< [s] recording time of the frozen pose
+  double hold = 1.5;      ///< [s] stands at rest before moving, so that a cape can settle
+  double blend_in = 1.5;  ///< [s] from the rest pose into the recording, ends at t = 0
+  double settle = 0.3;    ///< [s] over which playback slows down to a stop
+  double filter_hz = 8;   ///< [Hz] low-pass of the recording
   SkinSettings skin;
 };
 
 /// World points bound to the skeleton.
 struct Attachment {
-  Points<double> points{0, 3};                ///< [m] where they are at the time of binding
-  std::vector<Influence> influences;          ///< one a point
-  std::vector<io::JointFrame> bind_frames;    ///< the pose at the time of binding
+  Points<double> points{0, 3};              ///< [m] where they are at the time of binding
+  std::vector<Influence> influences;        ///< one a point
+  std::vector<io::JointFrame> bind_frames;  ///< the pose at the time of binding
 };
 
 /// A person of capsules, in the shown time t [s]:

@@ -62,16 +62,17 @@ Vec3 blend(const Influence& influence, std::span<const DualQuaternion> motions, 
   dual *= scale;
   const Vec3 r = real.head<3>();
   const Vec3 d = dual.head<3>();
-  return point + 2 * r.cross(r.cross(point) + real.w() * point) +
-         2 * (real.w() * d - dual.w() * r + r.cross(d));
+  return point + 2 * r.cross(r.cross(point) + real.w() * point) + 2 * (real.w() * d - dual.w() * r + r.cross(d));
 }
 
 Skinning::Skinning(const Body& body, const io::LocalPose& bind_pose, const SkinSettings& settings)
     : settings_(settings), bind_frames_(static_cast<std::size_t>(body.motion.joint_count())) {
   io::global_pose(body.motion, bind_pose, bind_frames_);
   std::vector<Capsule> capsules(body.capsules.size());
-  place_capsules(body, bind_frames_, capsules);
-  mesh_ = vdb::skin_capsules(capsules, settings.voxel_size, settings.blend_radius);
+  place_capsules(body.capsules, bind_frames_, capsules);
+  std::vector<Capsule> flesh(body.flesh.size());
+  place_capsules(body.flesh, bind_frames_, flesh);
+  mesh_ = vdb::skin_capsules(flesh, settings.voxel_size, settings.blend_radius);
   smooth(capsules);
   find_weights(body, capsules);
   find_neighbours(capsules);
@@ -93,11 +94,12 @@ void Skinning::smooth(std::span<const Capsule> capsules) {
   Values<double> degree = Values<double>::Zero(vertices);
   for (const Triangle& t : mesh_.triangles)
     for (const int v : t) degree[v] += 1;
-  for (int pass = 0; pass < 2 * settings_.smoothing; ++pass) {
+  const int last = 2 * settings_.smoothing;  // plain passes follow: they take single dents away
+  for (int pass = 0; pass < last + std::min(settings_.smoothing, 4); ++pass) {
     sum.setZero();
     for (const Triangle& t : mesh_.triangles)
       for (std::size_t e = 0; e < 3; ++e) sum.row(t[e]) += mesh_.vertices.row(t[(e + 1) % 3]);
-    const double factor = pass % 2 == 0 ? 0.85 : -0.88;
+    const double factor = pass >= last ? 0.5 : pass % 2 == 0 ? 0.7 : -0.72;
     mesh_.vertices += (sum.colwise() / degree - mesh_.vertices).colwise() * (factor * strength);
   }
 }
@@ -194,8 +196,8 @@ double Skinning::greatest_distance(const Points<double>& vertices, std::span<con
     const Vec3 x = vertices.row(v).matrix();
     double distance = 1e300;
     for (int n = near_start_[at]; n < near_start_[at + 1] && distance > greatest; ++n)
-      distance = std::min(
-          distance, signed_distance(capsules[static_cast<std::size_t>(near_[static_cast<std::size_t>(n)])], x));
+      distance = std::min(distance,
+                          signed_distance(capsules[static_cast<std::size_t>(near_[static_cast<std::size_t>(n)])], x));
     for (std::size_t c = 0; c < capsules.size() && distance > greatest; ++c)
       distance = std::min(distance, signed_distance(capsules[c], x));
     greatest = std::max(greatest, distance);

@@ -27,7 +27,7 @@ Vec3 blend(const Influence& influence, std::span<const DualQuaternion> motions, 
 
 struct SkinSettings {
   double voxel_size = 0.0095;   ///< [m]
-  double blend_radius = 0.024;  ///< [m] how far creases between capsules are filled
+  double blend_radius = 0.006;  ///< [m] how far creases between capsules are filled
   double weight_width = 0.03;   ///< [m] over which one joint hands over to the next
   int smoothing = 100;          ///< rounds of volume-preserving smoothing of the bind pose
   double clearance = 0.012;     ///< [m] no vertex ends farther outside its capsules

@@ -1,13 +1,14 @@
 #include <hooke/error.hpp>
 #include <hooke/io/motion.hpp>
 
-#include <assimp/Importer.hpp>
 #include <assimp/config.h>
 #include <assimp/scene.h>
+#include <assimp/Importer.hpp>
 
 #include <algorithm>
 #include <cassert>
 #include <cmath>
+#include <cstdlib>
 #include <fstream>
 #include <iterator>
 #include <map>
@@ -79,11 +80,20 @@ void add_frames(const std::filesystem::path& file, const aiAnimation& animation,
   }
 }
 
+// What the header says; the importer makes up a frame when there is none.
+long promised_frames(const std::filesystem::path& file, const std::string& text) {
+  const std::size_t motion = text.find("MOTION");
+  const std::size_t key = motion == std::string::npos ? motion : text.find("Frames:", motion);
+  if (key == std::string::npos) fail(file, "has no frames: the MOTION part is missing or cut off");
+  const long frames = std::strtol(text.c_str() + key + 7, nullptr, 10);
+  if (frames < 1) fail(file, "has no frames: Frames must be positive, got " + std::to_string(frames));
+  return frames;
+}
+
 void make_signs_continuous(Motion& motion) {
   const auto joints = static_cast<std::size_t>(motion.joint_count());
   for (std::size_t i = joints; i < motion.rotations.size(); ++i)
-    if (motion.rotations[i].dot(motion.rotations[i - joints]) < 0)
-      motion.rotations[i].coeffs() *= -1;
+    if (motion.rotations[i].dot(motion.rotations[i - joints]) < 0) motion.rotations[i].coeffs() *= -1;
 }
 
 // weights[k], k = 0 ... half, of a Gaussian with the given cut-off; they sum to 1 over ±half.
@@ -108,8 +118,7 @@ void filter_signal(Index frames, const std::vector<double>& weights, const At& a
   const auto sample = [&](Index f) -> Vector {
     const Index last = frames - 1;
     if (f < 0) return 2 * raw.front() - raw[static_cast<std::size_t>(std::min(-f, last))];
-    if (f > last)
-      return 2 * raw.back() - raw[static_cast<std::size_t>(std::max<Index>(2 * last - f, 0))];
+    if (f > last) return 2 * raw.back() - raw[static_cast<std::size_t>(std::max<Index>(2 * last - f, 0))];
     return raw[static_cast<std::size_t>(f)];
   };
   for (Index f = 0; f < frames; ++f) {
@@ -131,8 +140,8 @@ Motion read_motion(const std::filesystem::path& file) {
   const std::string text = read_text(file);
   const std::size_t start = text.find_first_not_of(" \t\r\n");
   if (start == std::string::npos) fail(file, "is empty");
-  if (text.compare(start, 9, "HIERARCHY") != 0)
-    fail(file, "is not a BVH file: it must start with HIERARCHY");
+  if (text.compare(start, 9, "HIERARCHY") != 0) fail(file, "is not a BVH file: it must start with HIERARCHY");
+  const long promised = promised_frames(file, text);
   Assimp::Importer importer;
   importer.SetPropertyBool(AI_CONFIG_IMPORT_NO_SKELETON_MESHES, true);
   const aiScene* scene = nullptr;
@@ -149,21 +158,20 @@ Motion read_motion(const std::filesystem::path& file) {
   const aiAnimation& animation = *scene->mAnimations[0];
   if (animation.mNumChannels == 0) fail(file, "has no joints");
   motion.frame_rate = animation.mTicksPerSecond;
-  if (!(motion.frame_rate > 0) || !std::isfinite(motion.frame_rate))
-    fail(file, "the frame time must be positive");
+  if (!(motion.frame_rate > 0) || !std::isfinite(motion.frame_rate)) fail(file, "the frame time must be positive");
   add_frames(file, animation, motion);
+  if (motion.frame_count() != promised)
+    fail(file, "promises " + std::to_string(promised) + " frames and has " + std::to_string(motion.frame_count()));
   make_signs_continuous(motion);
   return motion;
 }
 
 void drop_frames(Motion& motion, Index count) {
   if (count < 0 || count >= motion.frame_count())
-    throw std::invalid_argument("drop_frames: count must be in [0, " +
-                                std::to_string(motion.frame_count()) + "), got " +
-                                std::to_string(count));
+    throw std::invalid_argument("drop_frames: count must be in [0, " + std::to_string(motion.frame_count()) +
+                                "), got " + std::to_string(count));
   motion.root_positions.erase(motion.root_positions.begin(), motion.root_positions.begin() + count);
-  motion.rotations.erase(motion.rotations.begin(),
-                         motion.rotations.begin() + count * motion.joint_count());
+  motion.rotations.erase(motion.rotations.begin(), motion.rotations.begin() + count * motion.joint_count());
   motion.first_time += static_cast<double>(count) / motion.frame_rate;
 }
 
@@ -176,14 +184,12 @@ void scale(Motion& motion, double factor) {
 
 void low_pass(Motion& motion, double cut_off) {
   if (!(cut_off > 0) || !std::isfinite(cut_off))
-    throw std::invalid_argument("low_pass: cut_off must be positive, got " +
-                                std::to_string(cut_off) + " Hz");
+    throw std::invalid_argument("low_pass: cut_off must be positive, got " + std::to_string(cut_off) + " Hz");
   const std::vector<double> weights = gaussian_weights(cut_off, motion.frame_rate);
   const Index frames = motion.frame_count();
   const Index joints = motion.joint_count();
-  filter_signal<Vec3>(frames, weights, [&](Index f) -> Vec3& {
-    return motion.root_positions[static_cast<std::size_t>(f)];
-  });
+  filter_signal<Vec3>(frames, weights,
+                      [&](Index f) -> Vec3& { return motion.root_positions[static_cast<std::size_t>(f)]; });
   for (Index j = 0; j < joints; ++j)
     filter_signal<Eigen::Vector4d>(frames, weights, [&](Index f) -> Eigen::Vector4d& {
       return motion.rotations[static_cast<std::size_t>(f * joints + j)].coeffs();
@@ -195,17 +201,14 @@ void local_pose(const Motion& motion, double time, LocalPose& out) {
   assert(motion.frame_count() > 0);
   const auto joints = static_cast<std::size_t>(motion.joint_count());
   const Index last = motion.frame_count() - 1;
-  const double at = std::clamp((time - motion.first_time) * motion.frame_rate, 0.0,
-                               static_cast<double>(last));
+  const double at = std::clamp((time - motion.first_time) * motion.frame_rate, 0.0, static_cast<double>(last));
   const Index frame = std::min(static_cast<Index>(at), std::max<Index>(last - 1, 0));
   const double u = at - static_cast<double>(frame);
   const double u2 = u * u;
   const double u3 = u2 * u;
-  const double w[4] = {(-u + 2 * u2 - u3) / 2, (2 - 5 * u2 + 3 * u3) / 2,
-                       (u + 4 * u2 - 3 * u3) / 2, (u3 - u2) / 2};
+  const double w[4] = {(-u + 2 * u2 - u3) / 2, (2 - 5 * u2 + 3 * u3) / 2, (u + 4 * u2 - 3 * u3) / 2, (u3 - u2) / 2};
   std::size_t frames[4];
-  for (Index k = 0; k < 4; ++k)
-    frames[k] = static_cast<std::size_t>(std::clamp<Index>(frame + k - 1, 0, last));
+  for (Index k = 0; k < 4; ++k) frames[k] = static_cast<std::size_t>(std::clamp<Index>(frame + k - 1, 0, last));
 
   if (out.rotations.size() != joints) out.rotations.resize(joints);
   out.root.setZero();
@@ -213,8 +216,8 @@ void local_pose(const Motion& motion, double time, LocalPose& out) {
   const Quat* row[4];
   for (int k = 0; k < 4; ++k) row[k] = motion.rotations.data() + frames[k] * joints;
   for (std::size_t j = 0; j < joints; ++j) {
-    Eigen::Vector4d q = w[0] * row[0][j].coeffs() + w[1] * row[1][j].coeffs() +
-                        w[2] * row[2][j].coeffs() + w[3] * row[3][j].coeffs();
+    Eigen::Vector4d q =
+        w[0] * row[0][j].coeffs() + w[1] * row[1][j].coeffs() + w[2] * row[2][j].coeffs() + w[3] * row[3][j].coeffs();
     out.rotations[j].coeffs() = q / std::sqrt(q.squaredNorm());
   }
 }

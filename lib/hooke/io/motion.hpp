@@ -16,7 +16,7 @@ namespace hooke::io {
 
 /// Where a joint is and how it is turned, in the space of the recording.
 struct JointFrame {
-  Vec3 position{0, 0, 0};  ///< [m] once the motion is scaled to metres
+  Vec3 position{0, 0, 0};                                        ///< [m] once the motion is scaled to metres
   Eigen::Quaterniond rotation = Eigen::Quaterniond::Identity();  ///< unit
 
   /// The point of space that has the coordinates `local` in this frame.
@@ -43,9 +43,7 @@ struct Motion {
 
   Index joint_count() const { return static_cast<Index>(names.size()); }
   Index frame_count() const { return static_cast<Index>(root_positions.size()); }
-  double last_time() const {
-    return first_time + static_cast<double>(frame_count() - 1) / frame_rate;
-  }
+  double last_time() const { return first_time + static_cast<double>(frame_count() - 1) / frame_rate; }
   /// Index of the joint with this name, -1 when there is none.
   int find(std::string_view name) const;
 };

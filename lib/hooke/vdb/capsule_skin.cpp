@@ -1,8 +1,8 @@
 #include <hooke/vdb/capsule_skin.hpp>
 
-#include <Eigen/Geometry>
 #include <openvdb/openvdb.h>
 #include <openvdb/tools/VolumeToMesh.h>
+#include <Eigen/Geometry>
 
 #include <algorithm>
 #include <array>
@@ -22,8 +22,7 @@ constexpr double half_band = 3;  // [voxels]
 void check(std::span<const Capsule> capsules, double voxel_size, double blend_radius) {
   if (capsules.empty()) throw std::invalid_argument("skin_capsules: needs at least one capsule");
   if (!(voxel_size > 0) || !std::isfinite(voxel_size))
-    throw std::invalid_argument("skin_capsules: voxel_size must be positive, got " +
-                                std::to_string(voxel_size) + " m");
+    throw std::invalid_argument("skin_capsules: voxel_size must be positive, got " + std::to_string(voxel_size) + " m");
   if (!(blend_radius >= 0) || !std::isfinite(blend_radius))
     throw std::invalid_argument("skin_capsules: blend_radius must not be negative, got " +
                                 std::to_string(blend_radius) + " m");
@@ -31,15 +30,14 @@ void check(std::span<const Capsule> capsules, double voxel_size, double blend_ra
     if (!c.a.allFinite() || !c.b.allFinite())
       throw std::invalid_argument("skin_capsules: a capsule's end is not finite");
     if (!(c.radius > voxel_size / 2) || !std::isfinite(c.radius))
-      throw std::invalid_argument(
-          "skin_capsules: a capsule must be wider than a voxel, got radius " +
-          std::to_string(c.radius) + " m");
+      throw std::invalid_argument("skin_capsules: a capsule must be wider than a voxel, got radius " +
+                                  std::to_string(c.radius) + " m");
   }
 }
 
 // Capsules that can matter within `reach` of the point, nearest first is not needed here.
-std::vector<Capsule> near_capsules(std::span<const Capsule> capsules, const Vec3& center,
-                                   double reach, double blend_radius) {
+std::vector<Capsule> near_capsules(std::span<const Capsule> capsules, const Vec3& center, double reach,
+                                   double blend_radius) {
   std::vector<double> distance(capsules.size());
   double nearest = std::numeric_limits<double>::max();
   for (std::size_t i = 0; i < capsules.size(); ++i) {
@@ -53,8 +51,7 @@ std::vector<Capsule> near_capsules(std::span<const Capsule> capsules, const Vec3
 }
 
 // The level set: exact values in every leaf the surface can touch, a sign elsewhere.
-openvdb::FloatGrid::Ptr level_set(std::span<const Capsule> capsules, double voxel_size,
-                                  double blend_radius) {
+openvdb::FloatGrid::Ptr level_set(std::span<const Capsule> capsules, double voxel_size, double blend_radius) {
   Vec3 low = capsules[0].a;
   Vec3 high = low;
   for (const Capsule& c : capsules) {
@@ -71,8 +68,8 @@ openvdb::FloatGrid::Ptr level_set(std::span<const Capsule> capsules, double voxe
     const double to = std::floor((high[c] + margin) / block_size);
     voxels *= (to - from + 1) * block;
     if (!(voxels <= 1 << 30) || std::max(std::abs(from), std::abs(to)) > 1e8)
-      throw std::invalid_argument("skin_capsules: voxel_size is too small for the capsules: " +
-                                  std::to_string(voxel_size) + " m");
+      throw std::invalid_argument(
+          "skin_capsules: voxel_size is too small for the capsules: " + std::to_string(voxel_size) + " m");
     first[c] = static_cast<int>(from);
     last[c] = static_cast<int>(to);
   }
@@ -86,21 +83,18 @@ openvdb::FloatGrid::Ptr level_set(std::span<const Capsule> capsules, double voxe
   for (int bx = first[0]; bx <= last[0]; ++bx)
     for (int by = first[1]; by <= last[1]; ++by)
       for (int bz = first[2]; bz <= last[2]; ++bz) {
-        const Vec3 center = (Vec3(bx, by, bz) * block).array() * voxel_size +
-                            (block - 1) / 2.0 * voxel_size;
+        const Vec3 center = (Vec3(bx, by, bz) * block).array() * voxel_size + (block - 1) / 2.0 * voxel_size;
         const std::vector<Capsule> kept = near_capsules(capsules, center, reach, blend_radius);
         const double middle = smooth_union_distance(kept, blend_radius, center);
         const openvdb::Coord corner(bx * block, by * block, bz * block);
         if (middle > reach + background) continue;
         if (middle < -reach - background) {
-          grid->sparseFill(openvdb::CoordBBox::createCube(corner, block),
-                           static_cast<float>(-background), false);
+          grid->sparseFill(openvdb::CoordBBox::createCube(corner, block), static_cast<float>(-background), false);
           continue;
         }
         for (int i = 0; i < block * block * block; ++i) {
           const openvdb::Coord at = corner.offsetBy(i / (block * block), i / block % block, i % block);
-          const double d = smooth_union_distance(
-              kept, blend_radius, Vec3(at.x(), at.y(), at.z()) * voxel_size);
+          const double d = smooth_union_distance(kept, blend_radius, Vec3(at.x(), at.y(), at.z()) * voxel_size);
           const auto value = static_cast<float>(std::clamp(d, -background, background));
           if (std::abs(d) < background)
             accessor.setValueOn(at, value);
@@ -117,8 +111,7 @@ TriangleMesh mesh_grid(const openvdb::FloatGrid& grid) {
   TriangleMesh mesh;
   mesh.vertices.resize(static_cast<Index>(mesher.pointListSize()), 3);
   for (std::size_t v = 0; v < mesher.pointListSize(); ++v)
-    for (int c = 0; c < 3; ++c)
-      mesh.vertices(static_cast<Index>(v), c) = mesher.pointList()[v][c];
+    for (int c = 0; c < 3; ++c) mesh.vertices(static_cast<Index>(v), c) = mesher.pointList()[v][c];
   const auto point = [&](unsigned v) -> Vec3 { return mesh.vertices.row(v).matrix(); };
   for (std::size_t p = 0; p < mesher.polygonPoolListSize(); ++p) {
     const openvdb::tools::PolygonPool& pool = mesher.polygonPoolList()[p];
@@ -128,8 +121,7 @@ TriangleMesh mesh_grid(const openvdb::FloatGrid& grid) {
     }
     for (std::size_t i = 0; i < pool.numQuads(); ++i) {
       const openvdb::Vec4I& q = pool.quad(i);
-      const bool along_02 =
-          (point(q[0]) - point(q[2])).squaredNorm() <= (point(q[1]) - point(q[3])).squaredNorm();
+      const bool along_02 = (point(q[0]) - point(q[2])).squaredNorm() <= (point(q[1]) - point(q[3])).squaredNorm();
       const int s = along_02 ? 0 : 1;
       mesh.triangles.push_back({int(q[s]), int(q[s + 1]), int(q[s + 2])});
       mesh.triangles.push_back({int(q[s]), int(q[s + 2]), int(q[(s + 3) % 4])});
@@ -152,13 +144,12 @@ void orient_outward(TriangleMesh& mesh) {
 
 // The mesher puts a vertex at the mean of its cell's crossings. Even the vertices out and put
 // them on the surface itself, so that normals are smooth.
-void relax(TriangleMesh& mesh, std::span<const Capsule> capsules, double voxel_size,
-           double blend_radius) {
+void relax(TriangleMesh& mesh, std::span<const Capsule> capsules, double voxel_size, double blend_radius) {
   const Index count = mesh.vertices.rows();
   std::vector<std::vector<Capsule>> kept(static_cast<std::size_t>(count));
   for (Index v = 0; v < count; ++v)
-    kept[static_cast<std::size_t>(v)] = near_capsules(
-        capsules, mesh.vertices.row(v).matrix().transpose(), 1.5 * voxel_size, blend_radius);
+    kept[static_cast<std::size_t>(v)] =
+        near_capsules(capsules, mesh.vertices.row(v).matrix().transpose(), 1.5 * voxel_size, blend_radius);
   for (int round = 0; round < 4; ++round) {
     Points<double> sum = Points<double>::Zero(count, 3);
     Values<double> neighbours = Values<double>::Zero(count);
@@ -176,8 +167,8 @@ void relax(TriangleMesh& mesh, std::span<const Capsule> capsules, double voxel_s
       for (int newton = 0; newton < (round < 3 ? 1 : 2); ++newton) {
         const double h = 1e-4 * voxel_size;
         const double d = field(x);
-        const Vec3 gradient = Vec3(field(x + Vec3(h, 0, 0)) - d, field(x + Vec3(0, h, 0)) - d,
-                                   field(x + Vec3(0, 0, h)) - d) / h;
+        const Vec3 gradient =
+            Vec3(field(x + Vec3(h, 0, 0)) - d, field(x + Vec3(0, h, 0)) - d, field(x + Vec3(0, 0, h)) - d) / h;
         const double slope = gradient.squaredNorm();
         if (slope < 0.05) break;
         const double step = std::clamp(d / slope, -voxel_size, voxel_size);
@@ -190,8 +181,7 @@ void relax(TriangleMesh& mesh, std::span<const Capsule> capsules, double voxel_s
 
 }  // namespace
 
-double smooth_union_distance(std::span<const Capsule> capsules, double blend_radius,
-                             const Vec3& point) {
+double smooth_union_distance(std::span<const Capsule> capsules, double blend_radius, const Vec3& point) {
   assert(!capsules.empty());
   const double k = blend_radius;
   // Only the nearest few can matter; they are kept sorted so that the order of the capsules
@@ -215,8 +205,7 @@ double smooth_union_distance(std::span<const Capsule> capsules, double blend_rad
   return result;
 }
 
-TriangleMesh skin_capsules(std::span<const Capsule> capsules, double voxel_size,
-                           double blend_radius) {
+TriangleMesh skin_capsules(std::span<const Capsule> capsules, double voxel_size, double blend_radius) {
   check(capsules, voxel_size, blend_radius);
   openvdb::initialize();
   TriangleMesh mesh = mesh_grid(*level_set(capsules, voxel_size, blend_radius));

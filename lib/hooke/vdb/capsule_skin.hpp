@@ -13,8 +13,7 @@ namespace hooke::vdb {
 /// Never above the plain union's distance; two equal capsules come k/4 closer, more of them
 /// up to about k/2. For k = 0 the plain union.
 /// Precondition: at least one capsule (asserted). Cost: the number of capsules.
-double smooth_union_distance(std::span<const Capsule> capsules, double blend_radius,
-                             const Vec3& point);
+double smooth_union_distance(std::span<const Capsule> capsules, double blend_radius, const Vec3& point);
 
 /// A closed triangle mesh of the smooth union's surface, counter-clockwise from outside.
 /// Vertices lie on the surface to about a thousandth of the voxel size; triangles are about
@@ -22,7 +21,6 @@ double smooth_union_distance(std::span<const Capsule> capsules, double blend_rad
 /// Throws std::invalid_argument when there are no capsules, a capsule is not finite or not
 /// wider than a voxel, voxel_size is not positive, blend_radius is negative, or the bounding
 /// box would have more than 2^30 voxels. Cost: surface area / voxel_size². Deterministic.
-TriangleMesh skin_capsules(std::span<const Capsule> capsules, double voxel_size,
-                           double blend_radius);
+TriangleMesh skin_capsules(std::span<const Capsule> capsules, double voxel_size, double blend_radius);
 
 }  // namespace hooke::vdb
