@@ -28,22 +28,34 @@ namespace {
 template <class S>
 constexpr S kTiny = S(1e-12);
 
-template <class S, bool damped>
-HOOKE_INLINE void spring_loop(const SpringBlock<S>& s) {
-  const S *__restrict ax = s.a[0], *__restrict ay = s.a[1], *__restrict az = s.a[2];
-  const S *__restrict bx = s.b[0], *__restrict by = s.b[1], *__restrict bz = s.b[2];
-  const S *__restrict k = s.stiffness, *__restrict rest = s.rest, *__restrict rest2 = s.rest_squared;
-  S *__restrict fx = s.f[0], *__restrict fy = s.f[1], *__restrict fz = s.f[2];
+template <class S>
+HOOKE_INLINE void add(S* target, const S* source, S sign, int n) {
   HOOKE_INDEPENDENT
-  for (int i = 0; i < s.n; ++i) {
+  for (int i = 0; i < n; ++i) target[i] += sign * source[i];
+}
+
+template <class S, bool damped>
+HOOKE_INLINE void spring_loop(SpringBlock<S>& s) {
+  const S *ax = s.a[0], *ay = s.a[1], *az = s.a[2], *bx = s.b[0], *by = s.b[1], *bz = s.b[2];
+  const S *k = s.stiffness, *rest = s.rest, *rest2 = s.rest_squared;
+  const S *c = s.damping, *vax = s.va[0], *vay = s.va[1], *vaz = s.va[2], *vbx = s.vb[0], *vby = s.vb[1],
+          *vbz = s.vb[2];
+  S *fx = s.f[0], *fy = s.f[1], *fz = s.f[2];
+  const int n = s.n;
+  HOOKE_INDEPENDENT
+  for (int i = 0; i < n; ++i) {
     const S dx = bx[i] - ax[i], dy = by[i] - ay[i], dz = bz[i] - az[i];
     const S l2 = dx * dx + dy * dy + dz * dz;
     const S root = std::sqrt(l2);
     const S l = root > kTiny<S> ? root : kTiny<S>;
-    S scale = k[i] * (l2 - rest2[i]) / (l * (l + rest[i]));
+    const S sum = l + rest[i];
+    S scale;
     if constexpr (damped) {
-      const S approach = (s.vb[0][i] - s.va[0][i]) * dx + (s.vb[1][i] - s.va[1][i]) * dy + (s.vb[2][i] - s.va[2][i]) * dz;
-      scale += s.damping[i] * approach / (l * l);
+      // k (l² - L²) / (l (l + L)) + c v·d / l², over one denominator: one division instead of two.
+      const S closing = (vbx[i] - vax[i]) * dx + (vby[i] - vay[i]) * dy + (vbz[i] - vaz[i]) * dz;
+      scale = (k[i] * (l2 - rest2[i]) * l + c[i] * closing * sum) / (l * l * sum);
+    } else {
+      scale = k[i] * (l2 - rest2[i]) / (l * sum);
     }
     fx[i] = scale * dx;
     fy[i] = scale * dy;
@@ -52,52 +64,57 @@ HOOKE_INLINE void spring_loop(const SpringBlock<S>& s) {
 }
 
 template <class S>
-HOOKE_INLINE void springs(const SpringBlock<S>& s) {
+HOOKE_INLINE void springs(SpringBlock<S>& s) {
   if (s.damping)
     spring_loop<S, true>(s);
   else
     spring_loop<S, false>(s);
+  if (!s.sum_a[0]) return;
+  // Points a and b overlap, so their sums must not share a loop.
+  for (int k = 0; k < 3; ++k) add(s.sum_a[k], s.f[k], S(1), s.n);
+  for (int k = 0; k < 3; ++k) add(s.sum_b[k], s.f[k], S(-1), s.n);
 }
 
 template <class S>
-HOOKE_INLINE void wind(const WindBlock<S>& s) {
+HOOKE_INLINE void wind(WindBlock<S>& s) {
   const S third = S(1) / S(3);
-  S *__restrict fx = s.f[0], *__restrict fy = s.f[1], *__restrict fz = s.f[2];
+  S *fx = s.f[0], *fy = s.f[1], *fz = s.f[2];
+  const S *x0 = s.x[0][0], *y0 = s.x[0][1], *z0 = s.x[0][2], *x1 = s.x[1][0], *y1 = s.x[1][1], *z1 = s.x[1][2],
+          *x2 = s.x[2][0], *y2 = s.x[2][1], *z2 = s.x[2][2];
+  const S *vx0 = s.v[0][0], *vy0 = s.v[0][1], *vz0 = s.v[0][2], *vx1 = s.v[1][0], *vy1 = s.v[1][1],
+          *vz1 = s.v[1][2], *vx2 = s.v[2][0], *vy2 = s.v[2][1], *vz2 = s.v[2][2];
+  const S wind_x = s.wind[0], wind_y = s.wind[1], wind_z = s.wind[2], drag = s.drag, lift = s.lift;
+  const int n = s.n;
   HOOKE_INDEPENDENT
-  for (int i = 0; i < s.n; ++i) {
-    const S ux = s.x[1][0][i] - s.x[0][0][i], uy = s.x[1][1][i] - s.x[0][1][i], uz = s.x[1][2][i] - s.x[0][2][i];
-    const S wx = s.x[2][0][i] - s.x[0][0][i], wy = s.x[2][1][i] - s.x[0][1][i], wz = s.x[2][2][i] - s.x[0][2][i];
+  for (int i = 0; i < n; ++i) {
+    const S ux = x1[i] - x0[i], uy = y1[i] - y0[i], uz = z1[i] - z0[i];
+    const S wx = x2[i] - x0[i], wy = y2[i] - y0[i], wz = z2[i] - z0[i];
     // Twice the area times the normal, and the air's velocity relative to the triangle.
     const S nx = uy * wz - uz * wy, ny = uz * wx - ux * wz, nz = ux * wy - uy * wx;
-    const S vx = s.wind[0] - third * (s.v[0][0][i] + s.v[1][0][i] + s.v[2][0][i]);
-    const S vy = s.wind[1] - third * (s.v[0][1][i] + s.v[1][1][i] + s.v[2][1][i]);
-    const S vz = s.wind[2] - third * (s.v[0][2][i] + s.v[1][2][i] + s.v[2][2][i]);
+    const S vx = wind_x - third * (vx0[i] + vx1[i] + vx2[i]);
+    const S vy = wind_y - third * (vy0[i] + vy1[i] + vy2[i]);
+    const S vz = wind_z - third * (vz0[i] + vz1[i] + vz2[i]);
     const S flow = S(0.5) * (vx * nx + vy * ny + vz * nz);  // area times normal speed, signed
     const S size = std::sqrt(nx * nx + ny * ny + nz * nz), speed = std::sqrt(vx * vx + vy * vy + vz * vz);
     const S through = std::abs(flow);
     const S safe_size = size > kTiny<S> ? size : kTiny<S>, safe_speed = speed > kTiny<S> ? speed : kTiny<S>;
     // Drag: area seen by the air × |v| v. Lift: across v, ∝ |v|² cos α sin α.
-    const S along_normal = s.lift * flow * speed / safe_size;
-    const S along_flow = s.drag * through - s.lift * through * (S(2) * through / safe_size) / safe_speed;
+    const S along_normal = lift * flow * speed / safe_size;
+    const S along_flow = drag * through - lift * through * (S(2) * through / safe_size) / safe_speed;
     fx[i] = along_flow * vx + along_normal * nx;
     fy[i] = along_flow * vy + along_normal * ny;
     fz[i] = along_flow * vz + along_normal * nz;
   }
-}
-
-template <class S>
-HOOKE_INLINE void add(S* __restrict target, const S* __restrict source, S sign, int n) {
-  HOOKE_INDEPENDENT
-  for (int i = 0; i < n; ++i) target[i] += sign * source[i];
+  if (!s.sum[0][0]) return;
+  for (int c = 0; c < 3; ++c)
+    for (int k = 0; k < 3; ++k) add(s.sum[c][k], s.f[k], S(1), n);
 }
 
 }  // namespace
 
-HOOKE_CLONES void spring_forces(const SpringBlock<float>& block) { springs(block); }
-HOOKE_CLONES void spring_forces(const SpringBlock<double>& block) { springs(block); }
-HOOKE_CLONES void wind_forces(const WindBlock<float>& block) { wind(block); }
-HOOKE_CLONES void wind_forces(const WindBlock<double>& block) { wind(block); }
-HOOKE_CLONES void add_to(float* target, const float* source, float sign, int n) { add(target, source, sign, n); }
-HOOKE_CLONES void add_to(double* target, const double* source, double sign, int n) { add(target, source, sign, n); }
+HOOKE_CLONES void spring_forces(SpringBlock<float>& block) { springs(block); }
+HOOKE_CLONES void spring_forces(SpringBlock<double>& block) { springs(block); }
+HOOKE_CLONES void wind_forces(WindBlock<float>& block) { wind(block); }
+HOOKE_CLONES void wind_forces(WindBlock<double>& block) { wind(block); }
 
 }  // namespace hooke::softbody

@@ -14,6 +14,8 @@ namespace {
 
 // Shorter runs do not pay for themselves.
 constexpr Index kShortestRun = 8;
+// A gap of so few springs in a run, as at the end of a grid's row, is bridged by springs without stiffness.
+constexpr int kLongestGap = 2;
 
 template <class S>
 struct Unit {
@@ -48,19 +50,23 @@ SpringField<S>::SpringField(std::shared_ptr<const SpringNetwork> network, const 
     const Spring &s = springs[i], &t = springs[j];
     return std::tuple(s.b - s.a, s.a) < std::tuple(t.b - t.a, t.a);
   });
-  // Runs first, the rest behind them.
-  std::vector<std::size_t> loose, sorted;
+  // Runs first, the rest behind them. A bridge is a spring that pulls nothing.
+  std::vector<Spring> loose, sorted;
   for (std::size_t i = 0; i < order.size();) {
+    std::vector<Spring> run{springs[order[i]]};
     std::size_t end = i + 1;
-    const Spring& first = springs[order[i]];
-    while (end < order.size() && springs[order[end]].a == first.a + int(end - i) &&
-           springs[order[end]].b == first.b + int(end - i))
-      ++end;
-    if (Index(end - i) >= kShortestRun) {
-      runs_.push_back({Index(sorted.size()), Index(end - i), first.a, first.b});
-      sorted.insert(sorted.end(), order.begin() + std::ptrdiff_t(i), order.begin() + std::ptrdiff_t(end));
+    for (; end < order.size(); ++end) {
+      const Spring& next = springs[order[end]];
+      const int gap = next.a - run.back().a - 1;
+      if (next.b - next.a != run.back().b - run.back().a || gap < 0 || gap > kLongestGap) break;
+      for (int k = 0; k < gap; ++k) run.push_back({run.back().a + 1, run.back().b + 1, 0, 0, 1});
+      run.push_back(next);
+    }
+    if (Index(run.size()) >= kShortestRun) {
+      runs_.push_back({Index(sorted.size()), Index(run.size()), run[0].a, run[0].b});
+      sorted.insert(sorted.end(), run.begin(), run.end());
     } else {
-      loose.insert(loose.end(), order.begin() + std::ptrdiff_t(i), order.begin() + std::ptrdiff_t(end));
+      for (; i < end; ++i) loose.push_back(springs[order[i]]);
     }
     i = end;
   }
@@ -71,7 +77,7 @@ SpringField<S>::SpringField(std::shared_ptr<const SpringNetwork> network, const 
   stiffness_.resize(n), rest_.resize(n), rest_squared_.resize(n), damping_.resize(n);
   a_.resize(sorted.size()), b_.resize(sorted.size());
   for (Index i = 0; i < n; ++i) {
-    const Spring& s = springs[sorted[std::size_t(i)]];
+    const Spring& s = sorted[std::size_t(i)];
     a_[std::size_t(i)] = s.a, b_[std::size_t(i)] = s.b;
     stiffness_[i] = S(s.stiffness), damping_[i] = S(s.damping);
     damped_ = damped_ || s.damping > 0;
@@ -89,9 +95,7 @@ SpringField<S>::SpringField(std::shared_ptr<const SpringNetwork> network, const 
 
 template <class S>
 void SpringField<S>::add_force(const Points<S>& x, const Points<S>& v, double, Points<S>& f) const {
-  S force[3][kBlock], gathered[12][kBlock];
-  SpringBlock<S> block{};
-  for (int k = 0; k < 3; ++k) block.f[k] = force[k];
+  SpringBlock<S> block;
   const auto parameters = [&](Index first, int n) {
     block.n = n;
     block.stiffness = stiffness_.data() + first;
@@ -101,18 +105,21 @@ void SpringField<S>::add_force(const Points<S>& x, const Points<S>& v, double, P
   };
   for (const Run& run : runs_) {
     for (Index done = 0; done < run.count; done += kBlock) {
-      const int n = int(std::min<Index>(kBlock, run.count - done));
-      parameters(run.first + done, n);
+      parameters(run.first + done, int(std::min<Index>(kBlock, run.count - done)));
+      const Index a = run.a + done, b = run.b + done;
       for (int k = 0; k < 3; ++k) {
-        block.a[k] = x.col(k).data() + run.a + done, block.b[k] = x.col(k).data() + run.b + done;
-        if (damped_) block.va[k] = v.col(k).data() + run.a + done, block.vb[k] = v.col(k).data() + run.b + done;
+        block.a[k] = x.col(k).data() + a, block.b[k] = x.col(k).data() + b;
+        block.va[k] = v.col(k).data() + a, block.vb[k] = v.col(k).data() + b;
+        block.sum_a[k] = f.col(k).data() + a, block.sum_b[k] = f.col(k).data() + b;
       }
       spring_forces(block);
-      for (int k = 0; k < 3; ++k) {
-        add_to(f.col(k).data() + run.a + done, force[k], S(1), n);
-        add_to(f.col(k).data() + run.b + done, force[k], S(-1), n);
-      }
     }
+  }
+  S gathered[12][kBlock];
+  for (int k = 0; k < 3; ++k) {
+    block.a[k] = gathered[k], block.b[k] = gathered[3 + k];
+    block.va[k] = gathered[6 + k], block.vb[k] = gathered[9 + k];
+    block.sum_a[k] = block.sum_b[k] = nullptr;
   }
   for (Index first = loose_; first < size(); first += kBlock) {
     const int n = int(std::min<Index>(kBlock, size() - first));
@@ -120,14 +127,12 @@ void SpringField<S>::add_force(const Points<S>& x, const Points<S>& v, double, P
     parameters(first, n);
     for (int k = 0; k < 3; ++k) {
       for (int i = 0; i < n; ++i) gathered[k][i] = x(a[i], k), gathered[3 + k][i] = x(b[i], k);
-      block.a[k] = gathered[k], block.b[k] = gathered[3 + k];
-      if (!damped_) continue;
-      for (int i = 0; i < n; ++i) gathered[6 + k][i] = v(a[i], k), gathered[9 + k][i] = v(b[i], k);
-      block.va[k] = gathered[6 + k], block.vb[k] = gathered[9 + k];
+      if (damped_)
+        for (int i = 0; i < n; ++i) gathered[6 + k][i] = v(a[i], k), gathered[9 + k][i] = v(b[i], k);
     }
     spring_forces(block);
     for (int k = 0; k < 3; ++k)
-      for (int i = 0; i < n; ++i) f(a[i], k) += force[k][i], f(b[i], k) -= force[k][i];
+      for (int i = 0; i < n; ++i) f(a[i], k) += block.f[k][i], f(b[i], k) -= block.f[k][i];
   }
 }
 

@@ -84,10 +84,9 @@ WindField<S>::WindField(const Wind& wind, const std::vector<Triangle>& triangles
 
 template <class S>
 void WindField<S>::add_force(const Points<S>& x, const Points<S>& v, double t, Points<S>& f) const {
-  S force[3][kBlock], gathered[18][kBlock];
-  WindBlock<S> block{};
+  WindBlock<S> block;
   const Vec3 wind = wind_.velocity_at(t);
-  for (int k = 0; k < 3; ++k) block.wind[k] = S(wind[k]), block.f[k] = force[k];
+  for (int k = 0; k < 3; ++k) block.wind[k] = S(wind[k]);
   block.drag = S(wind_.air_density * wind_.drag / 6);
   block.lift = S(wind_.air_density * wind_.lift / 6);
   for (const Run& run : runs_) {
@@ -97,12 +96,14 @@ void WindField<S>::add_force(const Points<S>& x, const Points<S>& v, double t, P
         for (int k = 0; k < 3; ++k) {
           block.x[c][k] = x.col(k).data() + run.corner[c] + done;
           block.v[c][k] = v.col(k).data() + run.corner[c] + done;
+          block.sum[c][k] = f.col(k).data() + run.corner[c] + done;
         }
       wind_forces(block);
-      for (int c = 0; c < 3; ++c)
-        for (int k = 0; k < 3; ++k) add_to(f.col(k).data() + run.corner[c] + done, force[k], S(1), block.n);
     }
   }
+  S gathered[18][kBlock];
+  for (int c = 0; c < 3; ++c)
+    for (int k = 0; k < 3; ++k) block.sum[c][k] = nullptr;
   for (std::size_t first = 0; first < loose_.size(); first += kBlock) {
     block.n = int(std::min<std::size_t>(kBlock, loose_.size() - first));
     for (int c = 0; c < 3; ++c)
@@ -117,7 +118,7 @@ void WindField<S>::add_force(const Points<S>& x, const Points<S>& v, double t, P
     wind_forces(block);
     for (int i = 0; i < block.n; ++i)
       for (const int corner : loose_[first + std::size_t(i)])
-        for (int k = 0; k < 3; ++k) f(corner, k) += force[k][i];
+        for (int k = 0; k < 3; ++k) f(corner, k) += block.f[k][i];
   }
 }
 
