@@ -44,8 +44,8 @@ Camera frame_subject(const Vec3& lower, const Vec3& upper, const Vec3& view_dire
                         corner & 4 ? upper.z() : lower.z()) -
                    middle;
     const double depth = c.dot(forward);
-    distance = std::max({distance, std::abs(c.dot(right)) / tan_h - depth, std::abs(c.dot(up)) / tan_v - depth,
-                         0.01 - depth});
+    distance =
+        std::max({distance, std::abs(c.dot(right)) / tan_h - depth, std::abs(c.dot(up)) / tan_v - depth, 0.01 - depth});
   }
   return {middle - distance * forward, middle, world_up, vertical_fov_degrees};
 }

@@ -7,9 +7,9 @@ namespace hooke::render {
 
 /// A pinhole camera.
 struct Camera {
-  Vec3 eye{0, 1.3, 5};              ///< [m]
-  Vec3 target{0, 0.9, 0};           ///< the point in the middle of the picture [m], not the eye
-  Vec3 up{0, 1, 0};                 ///< not parallel to the line of sight; need not be unit
+  Vec3 eye{0, 1.3, 5};               ///< [m]
+  Vec3 target{0, 0.9, 0};            ///< the point in the middle of the picture [m], not the eye
+  Vec3 up{0, 1, 0};                  ///< not parallel to the line of sight; need not be unit
   double vertical_fov_degrees = 30;  ///< full angle of view from bottom to top, in (0, 180)
 };
 

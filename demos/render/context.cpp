@@ -127,15 +127,14 @@ GLuint make_texture(GLenum format, int width, int height, GLenum filter, int sam
   return texture;
 }
 
-GLuint make_depth_map(int width, int height) {
-  return make_texture(GL_DEPTH_COMPONENT32F, width, height, GL_NEAREST);
-}
+GLuint make_depth_map(int width, int height) { return make_texture(GL_DEPTH_COMPONENT32F, width, height, GL_NEAREST); }
 
 GLuint make_framebuffer(GLenum target, GLuint color, GLuint depth) {
   GLuint framebuffer = 0;
   glGenFramebuffers(1, &framebuffer);
   glBindFramebuffer(GL_FRAMEBUFFER, framebuffer);
-  if (color) glFramebufferTexture2D(GL_FRAMEBUFFER, GL_COLOR_ATTACHMENT0, target, color, 0);
+  if (color)
+    glFramebufferTexture2D(GL_FRAMEBUFFER, GL_COLOR_ATTACHMENT0, target, color, 0);
   else {
     glDrawBuffer(GL_NONE);
     glReadBuffer(GL_NONE);

@@ -359,7 +359,7 @@ void main() {
   if (back_face) n = -n;
   bool inside = back_face || side > 0.75;
   vec4 seen = visibility(n);
-  Surface s = Surface(inside ? inside_color : outside_color, sheen_color * (inside ? 0.35 : 1.0), roughness);
+  Surface s = Surface(inside ? inside_color : outside_color, sheen_color * (inside ? 0.8 : 1.0), roughness);
 #if CLOTH
   if (weave > 0.0) {
     vec2 dx = dFdx(cloth_place), dy = dFdy(cloth_place);
@@ -439,9 +439,7 @@ std::string surface_vertex_shader() { return std::string(kVersion) + kSurfaceVer
 std::string floor_vertex_shader() { return std::string(kVersion) + kFloorVertex; }
 std::string prepass_fragment_shader() { return std::string(kVersion) + kPrepass; }
 std::string full_screen_vertex_shader() { return std::string(kVersion) + kFullScreenVertex; }
-std::string visibility_fragment_shader() {
-  return kVersion + dome_size() + kPlaceOfPixel + kVisibility;
-}
+std::string visibility_fragment_shader() { return kVersion + dome_size() + kPlaceOfPixel + kVisibility; }
 std::string blur_fragment_shader() { return std::string(kVersion) + kPlaceOfPixel + kBlur; }
 std::string lit_fragment_shader(Shade shade) {
   const char* const choice = shade == Shade::Floor   ? "#define FLOOR 1\n#define CLOTH 0\n"

@@ -6,9 +6,9 @@
 
 namespace hooke::render {
 
-inline constexpr int kDomeDirections = 28;      ///< parallel lights that stand for light from all around
-inline constexpr int kDomeUpward = 20;          ///< of these, the first so many shine from above
-inline constexpr int kDomeColumns = 7;          ///< tiles side by side in the dome's depth map
+inline constexpr int kDomeDirections = 28;  ///< parallel lights that stand for light from all around
+inline constexpr int kDomeUpward = 20;      ///< of these, the first so many shine from above
+inline constexpr int kDomeColumns = 7;      ///< tiles side by side in the dome's depth map
 
 /// What the lit pass is compiled for.
 enum class Shade { Floor, Matte, Cloth };

@@ -300,8 +300,7 @@ void Stage::Studio::make_targets() {
   light = gl::make_texture(GL_RGBA16F, w, h, GL_NEAREST, kSamples);
   const GLuint light_depth = gl::make_texture(GL_DEPTH_COMPONENT32F, w, h, GL_NEAREST, kSamples);
   light_target = gl::make_framebuffer(GL_TEXTURE_2D_MULTISAMPLE, light, light_depth);
-  finished_target =
-      gl::make_framebuffer(GL_TEXTURE_2D, gl::make_texture(GL_RGBA8, width, height, GL_NEAREST), 0);
+  finished_target = gl::make_framebuffer(GL_TEXTURE_2D, gl::make_texture(GL_RGBA8, width, height, GL_NEAREST), 0);
 
   glGenSamplers(1, &compare_sampler);
   for (const GLenum which : {GL_TEXTURE_MIN_FILTER, GL_TEXTURE_MAG_FILTER})

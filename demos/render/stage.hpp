@@ -26,9 +26,9 @@ struct Material {
     Cloth   ///< woven: sheen at grazing angles, lining, thread detail, stitched hem
   };
   Kind kind = Kind::Matte;
-  Vec3 color{0.38, 0.35, 0.32};        ///< outside; the default is a warm grey mannequin
-  Vec3 inside_color{0.060, 0.040, 0.050};  ///< what back faces show (cloth: the lining)
-  Vec3 sheen{0.30, 0.12, 0.11};          ///< cloth: colour of the fuzz at grazing angles
+  Vec3 color{0.38, 0.35, 0.32};            ///< outside; the default is a warm grey mannequin
+  Vec3 inside_color{0.105, 0.045, 0.060};  ///< what back faces show (cloth: the lining)
+  Vec3 sheen{0.30, 0.12, 0.11};            ///< cloth: colour of the fuzz at grazing angles
   double roughness = 0.55;  ///< in (0, 1]; higher spreads and dims the highlight (matte) or sheen (cloth)
   double weave = 700;       ///< cloth: threads per metre, 0 for none; drawn only where the model has uv
 };
@@ -36,11 +36,11 @@ struct Material {
 /// A mesh and how to draw it. What the pointers name must live until draw() returns.
 /// Normals are computed from the mesh in every picture.
 struct Model {
-  const TriangleMesh* mesh = nullptr;      ///< required; triangles counter-clockwise seen from outside
+  const TriangleMesh* mesh = nullptr;  ///< required; triangles counter-clockwise seen from outside
   Material material{};
   const TextureCoordinates* uv = nullptr;  ///< optional, one row a vertex [m]: ties the weave to the cloth
-  double thickness = 0;   ///< [m]; above 0 two sheets at ± half of it are drawn, closed by a rounded hem
-  int subdivisions = 0;   ///< 0 to 2: rounds the mesh between its vertices, four times the triangles each
+  double thickness = 0;  ///< [m]; above 0 two sheets at ± half of it are drawn, closed by a rounded hem
+  int subdivisions = 0;  ///< 0 to 2: rounds the mesh between its vertices, four times the triangles each
 };
 
 /// The light in the studio.
@@ -50,9 +50,9 @@ struct Look {
   double key_size = 0.22;                 ///< angle the light fills, seen from the subject [rad]: softness of shadows
   Vec3 rim_direction{0.62, 0.42, -0.66};  ///< towards the cool light behind the subject; any length
   double rim_intensity = 1;
-  double fill_intensity = 1;              ///< light from all around
-  double exposure = 1;                    ///< multiplies everything before tone mapping
-  Vec3 floor_color{0.36, 0.36, 0.37};     ///< linear RGB reflectance of the floor
+  double fill_intensity = 1;           ///< light from all around
+  double exposure = 1;                 ///< multiplies everything before tone mapping
+  Vec3 floor_color{0.36, 0.36, 0.37};  ///< linear RGB reflectance of the floor
 };
 
 /// The default look turned so that, for `camera`, the key light comes from the left and
@@ -79,8 +79,7 @@ class Stage {
   /// bottom left corner. Connectivity and uv are uploaded again only when they change, by
   /// place in `models`, so keep the order from frame to frame. Throws std::invalid_argument
   /// naming the model and vertex if a coordinate is not finite or an index out of range.
-  Image draw(std::span<const Model> models, const Camera& camera,
-             const std::vector<std::string>& caption_lines = {});
+  Image draw(std::span<const Model> models, const Camera& camera, const std::vector<std::string>& caption_lines = {});
 
  private:
   struct Studio;

@@ -71,8 +71,8 @@ Surface::Surface(const Model& model)
 }
 
 bool Surface::fits(const Model& model) const {
-  const bool same_uv = model.uv ? given_uv_.rows() == model.uv->rows() && (given_uv_ == *model.uv).all()
-                                : given_uv_.rows() == 0;
+  const bool same_uv =
+      model.uv ? given_uv_.rows() == model.uv->rows() && (given_uv_ == *model.uv).all() : given_uv_.rows() == 0;
   return same_uv && model.mesh->vertices.rows() == given_count_ && model.thickness == thickness_ &&
          model.subdivisions == subdivisions_ && model.mesh->triangles == given_;
 }
@@ -83,8 +83,8 @@ void Surface::subdivide() {
   std::vector<Edge> edges;
   const int first = static_cast<int>(position_.size());
   const auto middle = [&](int a, int b) {
-    const auto [place, is_new] = middle_of.try_emplace(edge_key(std::min(a, b), std::max(a, b)),
-                                                       first + static_cast<int>(edges.size()));
+    const auto [place, is_new] =
+        middle_of.try_emplace(edge_key(std::min(a, b), std::max(a, b)), first + static_cast<int>(edges.size()));
     if (is_new) {
       edges.push_back({a, b});
       if (!uv_.empty()) uv_.push_back(0.5 * (uv_[a] + uv_[b]));

@@ -65,13 +65,13 @@ class Surface {
   double thickness_ = 0;
   int subdivisions_ = 0;
 
-  std::vector<std::vector<Edge>> midpoints_;          // one list of split edges a subdivision
+  std::vector<std::vector<Edge>> midpoints_;            // one list of split edges a subdivision
   std::vector<std::vector<Triangle>> level_triangles_;  // before each subdivision
-  std::vector<Triangle> sheet_;                       // after all of them
+  std::vector<Triangle> sheet_;                         // after all of them
   std::vector<Eigen::Vector2d> uv_;
-  std::vector<Edge> border_;         // directed, interior on the left seen from outside
+  std::vector<Edge> border_;  // directed, interior on the left seen from outside
   std::vector<int> border_vertices_;
-  std::vector<int> border_slot_;     // vertex -> place in border_vertices_, or -1
+  std::vector<int> border_slot_;  // vertex -> place in border_vertices_, or -1
   std::vector<float> hem_;
   std::vector<std::uint32_t> indices_;
   std::size_t coarse_count_ = 0;

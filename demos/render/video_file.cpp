@@ -103,8 +103,8 @@ struct VideoFile::Encoder {
     rate << fps;
     // A leading "-" in a file name would be read as an option; "file:" rules that out.
     return {program.string(), "-hide_banner", "-loglevel", "error", "-nostdin", "-y", "-f", "rawvideo", "-pixel_format",
-            "rgb24", "-video_size", std::to_string(width) + "x" + std::to_string(height), "-framerate", rate.str(), "-i",
-            "pipe:0", "-an",
+            "rgb24", "-video_size", std::to_string(width) + "x" + std::to_string(height), "-framerate", rate.str(),
+            "-i", "pipe:0", "-an",
             // Our pictures are sRGB; the matrix has to be named or players guess from the size.
             "-vf", "scale=out_color_matrix=bt709:out_range=tv", "-colorspace", "bt709", "-color_primaries", "bt709",
             "-color_trc", "iec61966-2-1", "-color_range", "tv", "-c:v", "libx264", "-preset", "medium", "-crf", "18",
@@ -154,8 +154,10 @@ struct VideoFile::Encoder {
     while ((got = waitpid(process, &status, 0)) < 0 && errno == EINTR) {
     }
     process = -1;
-    if (got < 0) exit_code = 0;  // someone else collected it (SIGCHLD ignored): judge by the file
-    else exit_code = WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
+    if (got < 0)
+      exit_code = 0;  // someone else collected it (SIGCHLD ignored): judge by the file
+    else
+      exit_code = WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
   }
 
   [[noreturn]] void fail_with_encoder_text(const std::string& otherwise) {

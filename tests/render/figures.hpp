@@ -23,7 +23,8 @@ inline void append(TriangleMesh& mesh, const std::vector<Vec3>& points, const st
 inline void append_capsule(TriangleMesh& mesh, const Vec3& a, const Vec3& b, double ra, double rb, int around = 40,
                            const Vec3& thin = Vec3::UnitZ(), double squash = 1) {
   const Vec3 axis = (b - a).norm() > 1e-12 ? Vec3((b - a).normalized()) : Vec3::UnitY();
-  const Vec3 right = (std::abs(axis.dot(thin)) > 0.9 ? Vec3(axis.unitOrthogonal()) : Vec3(thin.cross(axis))).normalized();
+  const Vec3 right =
+      (std::abs(axis.dot(thin)) > 0.9 ? Vec3(axis.unitOrthogonal()) : Vec3(thin.cross(axis))).normalized();
   const Vec3 front = right.cross(axis);
   std::vector<Vec3> points;
   std::vector<Triangle> triangles;
