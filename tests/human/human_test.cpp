@@ -186,6 +186,36 @@ TEST(HumanSkin, IsClosedAndOutward) {
   }
 }
 
+// Triangles that face against the surface around them.
+int folded(const Points<double>& vertices, const std::vector<Triangle>& triangles) {
+  const auto normal = [&](const Triangle& t) {
+    const Vec3 a = vertices.row(t[0]).matrix();
+    const Vec3 b = vertices.row(t[1]).matrix();
+    const Vec3 c = vertices.row(t[2]).matrix();
+    return Vec3((b - a).cross(c - a));
+  };
+  std::vector<Vec3> around(static_cast<std::size_t>(vertices.rows()), Vec3::Zero());
+  for (const Triangle& t : triangles)
+    for (const int v : t) around[static_cast<std::size_t>(v)] += normal(t);
+  int count = 0;
+  for (const Triangle& t : triangles) {
+    Vec3 mean = Vec3::Zero();
+    for (const int v : t) mean += around[static_cast<std::size_t>(v)].normalized();
+    if (normal(t).dot(mean) < 0) ++count;
+  }
+  return count;
+}
+
+TEST(HumanSkin, FoldsNowhereButInTheCreaseOfAnElbow) {
+  const TriangleMesh& mesh = person().skin();
+  EXPECT_EQ(folded(mesh.vertices, mesh.triangles), 0);
+  Points<double> vertices;
+  for (double t = person().start_time(); t < 7.1; t += 0.1) {
+    person().skin(t, vertices);
+    EXPECT_LE(folded(vertices, mesh.triangles), 15) << t;
+  }
+}
+
 TEST(HumanSkin, StaysWithinTheClearance) {
   const human::HumanSettings settings;
   const double clearance = person().skin_clearance(person().start_time(), 7.1, 15);
