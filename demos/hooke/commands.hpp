@@ -1,0 +1,32 @@
+// What the command can do. Each returns an exit code and throws hooke::Error (exit 2) or
+// hooke::OutputError (exit 3).
+#pragma once
+
+#include "run.hpp"
+
+#include <filesystem>
+#include <optional>
+#include <string>
+
+namespace hooke::command {
+
+struct SimulateOptions {
+  RunOptions run;
+  std::filesystem::path out;
+  std::string export_format;  ///< empty: none
+};
+int simulate(const SimulateOptions& options);
+
+struct RenderOptions {
+  RunOptions run;
+  std::filesystem::path out;  ///< FILE.mp4, FILE.png or a folder for PNG files
+  int width = 1280, height = 720, supersample = 1;
+  std::optional<double> frame_at;  ///< [s], of a PNG
+};
+int render(const RenderOptions& options);
+
+int validate(const std::string& scene);
+
+int list();
+
+}  // namespace hooke::command

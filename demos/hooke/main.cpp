@@ -1,0 +1,128 @@
+// The hooke command: reads its arguments, calls one command, turns exceptions into exit codes.
+#include "commands.hpp"
+
+#include <hooke/error.hpp>
+
+#include <CLI/CLI.hpp>
+
+#include <cmath>
+#include <cstdio>
+#include <exception>
+#include <new>
+
+namespace hooke::command {
+
+namespace {
+
+// One line whatever an error says.
+int tell(int code, std::string text) {
+  for (char& c : text)
+    if (c == '\n' || c == '\r') c = ' ';
+  std::fprintf(stderr, "hooke: %s\n", text.c_str());
+  return code;
+}
+
+struct Arguments {
+  SimulateOptions simulate;
+  RenderOptions render;
+  std::string validate_scene, size;
+  bool resume = false, list = false;
+};
+
+void add_run_options(CLI::App& command, RunOptions& run) {
+  command.add_option("scene", run.scene, "Scene file, or the name of a scene (hooke list)")->required();
+  command.add_option("--method", run.method, "Integration method of every body, e.g. velocity-verlet");
+  command.add_option("--dt", run.dt, "Largest substep [s]; without it from the largest stable one");
+  command.add_option("--precision", run.precision, "float or double");
+  command.add_option("--end", run.end, "Simulated time [s] instead of the scene's duration");
+  command.add_option("--threads", run.threads, "Threads that move bodies; one body is moved by one thread");
+}
+
+void check(const CLI::App& command, const RunOptions& run) {
+  for (const auto& [name, value] : {std::pair{"--dt", run.dt}, {"--end", run.end}})
+    if (command.count(name) && !(value > 0 && std::isfinite(value)))
+      throw Error(std::string(name) + " must be positive [s], got " + std::to_string(value));
+  if (run.end > 1e6) throw Error("--end must be at most 1e6 s, got " + std::to_string(run.end));
+}
+
+void read_size(const std::string& text, RenderOptions& options) {
+  int used = 0;
+  if (std::sscanf(text.c_str(), "%dx%d%n", &options.width, &options.height, &used) != 2 || std::size_t(used) != text.size())
+    throw Error("--size must be WIDTHxHEIGHT in pixels, e.g. 1920x1080, got " + text);
+  if (options.width < 16 || options.height < 16 || options.width > 8192 || options.height > 8192)
+    throw Error("--size must be from 16x16 to 8192x8192, got " + text);
+}
+
+int dispatch(int argc, char** argv) {
+  Arguments a;
+  CLI::App app("Simulates and draws soft bodies.\nExit codes: 0 done, 1 diverged, 2 bad input, 3 output not writable, "
+               "130 interrupted.",
+               "hooke");
+  app.add_flag("--list", a.list, "The scenes that have a name");
+  app.footer("Example: hooke render cape --out cape.mp4");
+
+  CLI::App* simulate_command = app.add_subcommand("simulate", "Simulate a scene and write its end and its diagnostics");
+  add_run_options(*simulate_command, a.simulate.run);
+  simulate_command->add_option("--out", a.simulate.out, "Folder for state.csv, diagnostics.csv and timings.csv")->required();
+  simulate_command->add_option("--export", a.simulate.export_format, "Moving meshes as well: obj, ply or pc2");
+  simulate_command->add_flag("--resume", a.resume, "Not available: there are no checkpoints yet");
+  simulate_command->footer("Example: hooke simulate hanging-sheet-32 --method velocity-verlet --precision double --out sheet");
+
+  CLI::App* render_command = app.add_subcommand("render", "Simulate a scene and draw it as a film or a picture");
+  add_run_options(*render_command, a.render.run);
+  render_command->add_option("--out", a.render.out, "FILE.mp4, FILE.png or a folder for one PNG a frame")->required();
+  render_command->add_option("--size", a.size, "WIDTHxHEIGHT [pixels], 1280x720 if not given");
+  render_command->add_option("--frame-at", a.render.frame_at, "Moment of a PNG [s]");
+  render_command->add_option("--supersample", a.render.supersample, "1 to 4: draws that many times larger and averages");
+  render_command->footer("Example: hooke render flag --out flag.png --frame-at 2.5 --size 1920x1080 --supersample 2");
+
+  CLI::App* validate_command = app.add_subcommand("validate", "Check a scene; largest stable step of every method");
+  validate_command->add_option("scene", a.validate_scene, "Scene file, or the name of a scene")->required();
+  validate_command->footer("Example: hooke validate my-scene.json");
+
+  CLI::App* list_command = app.add_subcommand("list", "The scenes that have a name");
+  list_command->footer("Example: hooke list");
+  app.require_subcommand(0, 1);
+
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::Success& help) {
+    return app.exit(help);
+  } catch (const CLI::ParseError& error) {
+    return tell(kBadInput, std::string(error.what()) + " (hooke --help)");
+  }
+  if (simulate_command->parsed()) {
+    if (a.resume) throw Error("--resume is not available: runs leave no checkpoints yet; run again without it");
+    check(*simulate_command, a.simulate.run);
+    return simulate(a.simulate);
+  }
+  if (render_command->parsed()) {
+    check(*render_command, a.render.run);
+    if (!a.size.empty()) read_size(a.size, a.render);
+    if (a.render.supersample < 1 || a.render.supersample > 4)
+      throw Error("--supersample must be from 1 to 4, got " + std::to_string(a.render.supersample));
+    return render(a.render);
+  }
+  if (validate_command->parsed()) return validate(a.validate_scene);
+  if (list_command->parsed() || a.list) return list();
+  return tell(kBadInput, "a command is needed: simulate, render, validate or list (hooke --help)");
+}
+
+}  // namespace
+
+}  // namespace hooke::command
+
+int main(int argc, char** argv) {
+  using namespace hooke::command;
+  try {
+    return dispatch(argc, argv);
+  } catch (const hooke::OutputError& error) {
+    return tell(kOutputFailed, error.what());
+  } catch (const std::bad_alloc&) {
+    return tell(kBadInput, "not enough memory");
+  } catch (const std::exception& error) {
+    return tell(kBadInput, error.what());
+  } catch (...) {
+    return tell(kBadInput, "unexpected error");
+  }
+}

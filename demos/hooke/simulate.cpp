@@ -1,0 +1,97 @@
+#include "commands.hpp"
+
+#include <hooke/io/mesh_cache.hpp>
+#include <hooke/io/tables.hpp>
+
+#include <cstdio>
+#include <memory>
+#include <set>
+
+namespace hooke::command {
+
+namespace {
+
+// A body's name as part of a file name; different bodies get different ones.
+std::string file_name(const std::string& name, std::set<std::string>& taken) {
+  std::string out;
+  for (const char c : name)
+    out += (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '-' || c == '_' ? c : '_';
+  std::string unique = out.substr(0, 100);
+  for (int i = 2; !taken.insert(unique).second; ++i) unique = out.substr(0, 100) + "-" + std::to_string(i);
+  return unique;
+}
+
+// The files of one run.
+class Outputs {
+ public:
+  Outputs(const SimulateOptions& options, const scene::Scene& scene)
+      : folder_(options.out), diagnostics_(folder_ / "diagnostics.csv"), timings_(folder_ / "timings.csv") {
+    if (options.export_format.empty()) return;
+    std::set<std::string> taken;
+    for (const scene::SceneBody& body : scene.bodies)
+      caches_.push_back(io::make_mesh_cache(io::cache_format_named(options.export_format), folder_,
+                                            file_name(body.body->name(), taken), body.triangles));
+  }
+
+  void add(const scene::Scene& scene, double simulate_ms) {
+    io::Timings timings;
+    timings.time = scene.shown_time();
+    timings.simulate = simulate_ms;
+    double begin = wall_seconds();
+    const auto lap = [&begin] {
+      const double now = wall_seconds(), ms = 1e3 * (now - begin);
+      begin = now;
+      return ms;
+    };
+    const Energy energy = scene.world.energy();
+    const io::Diagnostics diagnostics{scene.shown_time(),      energy.kinetic,         energy.gravitational,
+                                      energy.elastic,          scene.world.momentum(), scene::worst_stretch(scene)};
+    timings.measure = lap();
+    diagnostics_.add(diagnostics);
+    for (std::size_t i = 0; i < caches_.size(); ++i) caches_[i]->add(scene.bodies[i].body->positions());
+    timings.write = lap();
+    timings_.add(timings);
+  }
+
+  void finish(const scene::Scene& scene) {
+    io::StateTable state(folder_ / "state.csv");
+    for (const scene::SceneBody& body : scene.bodies)
+      state.add(body.body->name(), body.body->positions(), body.body->velocities());
+    state.finish();
+    diagnostics_.finish();
+    timings_.finish();
+    for (const auto& cache : caches_) cache->finish();
+  }
+
+ private:
+  std::filesystem::path folder_;
+  io::DiagnosticsTable diagnostics_;
+  io::TimingsTable timings_;
+  std::vector<std::unique_ptr<io::MeshCache>> caches_;
+};
+
+}  // namespace
+
+int simulate(const SimulateOptions& options) {
+  if (!options.export_format.empty()) io::cache_format_named(options.export_format);
+  scene::Scene scene = prepare(options.run);
+  io::make_folder(options.out);
+  Outputs outputs(options, scene);
+  catch_signals();
+  bool told = false;
+  const RunResult result = run(scene, scene.description.duration, [&](std::int64_t frame, double ms) {
+    outputs.add(scene, ms);
+    if (frame == 0 || told) return;
+    told = true;
+    std::printf("%s", chosen(scene).c_str());
+    std::fflush(stdout);
+  });
+  if (!told) std::printf("%s", chosen(scene).c_str());
+  outputs.finish(scene);
+  std::printf("%s", summary(result).c_str());
+  if (!result.report.good()) std::fprintf(stderr, "hooke: %s\n", result.report.text().c_str());
+  if (result.interrupted) std::fprintf(stderr, "hooke: interrupted at %.6g s; what is finished is in %s\n", result.shown_time, options.out.c_str());
+  return result.exit_code();
+}
+
+}  // namespace hooke::command

@@ -1,0 +1,82 @@
+#include "commands.hpp"
+
+#include <hooke/error.hpp>
+#include <hooke/method.hpp>
+#include <scene/library.hpp>
+
+#include <cmath>
+#include <cstdio>
+#include <stdexcept>
+
+namespace hooke::command {
+
+namespace {
+
+void print_body(const scene::SceneBody& body) {
+  const Points<double> x = body.body->positions();
+  const Vec3 extent = (x.colwise().maxCoeff() - x.colwise().minCoeff()).matrix().transpose();
+  Index held = 0;
+  for (const bool is_held : body.held) held += is_held;
+  std::printf("%s: %ld points (%ld held), %zu springs, %zu triangles, %.6g kg, %.4g x %.4g x %.4g m\n",
+              body.body->name().c_str(), long(x.rows()), long(held), body.network->springs.size(), body.triangles.size(),
+              body.body->total_mass(), extent.x(), extent.y(), extent.z());
+}
+
+// "0.53 ms", "none", "any" or why the method cannot be used.
+std::string stable_text(double step) {
+  if (std::isinf(step)) return "any";
+  if (!(step > 0)) return "none is stable without damping";
+  char text[40];
+  std::snprintf(text, sizeof text, "%.4g ms", 1e3 * step);
+  return text;
+}
+
+}  // namespace
+
+int validate(const std::string& name) {
+  const scene::SceneDescription description = scene::find_scene(name);
+  scene::Scene scene = scene::build(description);
+  std::printf("%s%s%s\n", name.c_str(), description.title.empty() ? "" : ": ", description.title.c_str());
+  std::printf("%.6g s at %.6g frames and %.6g ticks a second, preroll %.6g s\n", description.duration,
+              description.frame_rate, description.tick_rate, description.preroll);
+
+  std::vector<std::vector<std::string>> stable(scene.bodies.size());
+  for (const Method* method : methods()) {
+    for (std::size_t i = 0; i < scene.bodies.size(); ++i) {
+      scene::SceneDescription one = description;
+      one.bodies = {description.bodies[i]};
+      scene::override_solver(one, std::string(method->name), 0, "");
+      std::string text;
+      try {
+        text = stable_text(scene::motion_facts(*scene::build(one, &scene).bodies[0].body).stable_step);
+      } catch (const Error&) {
+        text = "does not accept forces of velocity";
+      }
+      stable[i].push_back(text);
+    }
+  }
+
+  // One tick shows what the automatic step makes of it.
+  const StepReport report = scene.world.update(scene.world.clock().tick());
+  for (std::size_t i = 0; i < scene.bodies.size(); ++i) {
+    print_body(scene.bodies[i]);
+    std::printf("  largest stable step:\n");
+    for (std::size_t m = 0; m < methods().size(); ++m)
+      std::printf("    %-22s %s\n", std::string(methods()[m]->name).c_str(), stable[i][m].c_str());
+  }
+  std::printf("%s", chosen(scene).c_str());
+  if (!report.good()) {
+    std::printf("the first tick fails: %s\n", report.text().c_str());
+    return kDiverged;
+  }
+  std::printf("valid\n");
+  return kDone;
+}
+
+int list() {
+  for (const scene::NamedScene& scene : scene::named_scenes())
+    std::printf("%-24s %s\n", scene.name.c_str(), scene.title.c_str());
+  return kDone;
+}
+
+}  // namespace hooke::command
