@@ -127,12 +127,12 @@ float soft_shadow(vec3 p, vec3 n, float turn, float jitter) {
   bool in_map = facing > 0.0 && all(lessThan(abs(c.xy - 0.5), vec2(0.5)));
 
   float weight = 0.0, sum = 0.0;
-  int search = in_map ? 10 : 0;
+  int search = in_map ? 10 : 0;  // denser towards the middle, where low blockers have to be
   for (int i = 0; i < search; ++i) {
-    float r = reach * sqrt((float(i) + jitter) / 10.0), a = float(i) * golden + turn;
+    float u = (float(i) + jitter) / 10.0, r = reach * u * u, a = float(i) * golden + turn;
     vec2 o = r * vec2(cos(a), sin(a));
     float gap = (depth - texture(key_depth, c.xy + o * per_metre).r) * metres + clamp(dot(tilt, o), -0.15, 0.15) - bias;
-    float w = gap > 0.0 ? clamp((key_tan * gap - 0.5 * r) / (0.3 * r) , 0.0, 1.0) : 0.0;
+    float w = gap > 0.0 ? clamp((key_tan * gap - 0.5 * r) / (0.3 * r + 1e-4), 0.0, 1.0) : 0.0;
     w /= (gap + 0.03);
     weight += w;
     sum += w * gap;
