@@ -99,7 +99,8 @@ struct ColliderDescription {
 
 struct CameraDescription {
   Vec3 eye{0, 1.3, 5}, target{0, 0.9, 0};
-  double fov = 30;  ///< [degrees]
+  double fov = 30;      ///< [degrees]
+  bool follow = false;  ///< eye and target are relative to where the first human walks
 };
 
 struct SceneDescription {

@@ -335,6 +335,7 @@ CameraDescription read_camera(const Object& object) {
   camera.eye = object["eye"].vec3();
   camera.target = object["target"].vec3();
   camera.fov = object.number("fov", camera.fov, Range::between(1, 120, "from 1 to 120"), "degrees");
+  if (object.has("follow")) camera.follow = object["follow"].truth();
   const Vec3 sight = camera.target - camera.eye;
   if (!(std::hypot(sight.x(), sight.z()) > 1e-6)) object.value().fail("must not look straight up or down");
   return camera;

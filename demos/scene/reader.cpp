@@ -130,7 +130,7 @@ const KeyTable& key_table() {
       {"human",
        {"type", "name", "motion", "height", "from", "until", "hold", "blend_in", "settle", "filter_hz", "friction",
         "restitution", "color"}},
-      {"camera", {"eye", "target", "fov"}},
+      {"camera", {"eye", "target", "fov", "follow"}},
   };
   return table;
 }
@@ -180,6 +180,11 @@ std::string Value::text() const {
   if (std::any_of(text.begin(), text.end(), [](char c) { return static_cast<unsigned char>(c) < 0x20 || c == 0x7f; }))
     fail_got("must have no control characters");
   return text;
+}
+
+bool Value::truth() const {
+  if (!json_->is_boolean()) fail_got("must be true or false");
+  return json_->get<bool>();
 }
 
 Vec3 Value::vec3() const {

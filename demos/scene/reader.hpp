@@ -56,6 +56,7 @@ class Value {
   double number(const Range& range = Range::any(), const char* unit = "") const;
   Index whole(Index least, Index most) const;
   std::string text() const;      ///< not empty, no control characters
+  bool truth() const;            ///< true or false
   Vec3 vec3() const;             ///< [x, y, z]
   std::size_t array() const;     ///< its length; fails for anything else
   Value at(std::size_t i) const;

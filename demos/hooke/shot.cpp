@@ -1,0 +1,225 @@
+#include "shot.hpp"
+
+#include "solids.hpp"
+
+#include <scene/figures.hpp>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+
+namespace hooke::command {
+
+namespace {
+
+constexpr double kClothThickness = 2.5e-3;  // [m] as drawn
+constexpr double kFollowWidth = 0.6;        // [s], standard deviation of the camera's average
+constexpr Index kMostSticks = 20000;
+const Vec3 kClothColor{0.42, 0.022, 0.028}, kInsideColor{0.05, 0.04, 0.045}, kSolidColor{0.40, 0.42, 0.45};
+
+// The hips, as they would move if they did nothing abruptly: a Gaussian average over time.
+Vec3 followed(const human::Human& human, double t, double least_time, std::vector<io::JointFrame>& joints) {
+  Vec3 sum = Vec3::Zero();
+  double weights = 0;
+  for (double offset = -3 * kFollowWidth; offset <= 3 * kFollowWidth + 1e-9; offset += kFollowWidth / 10) {
+    human.pose(std::max(t + offset, least_time), joints);
+    const double weight = std::exp(-0.5 * offset * offset / (kFollowWidth * kFollowWidth));
+    sum += weight * joints[0].position;
+    weights += weight;
+  }
+  return sum / weights;
+}
+
+}  // namespace
+
+Snapshot snapshot_of(const scene::Scene& scene, double simulate_ms) {
+  Snapshot out{scene.shown_time(), simulate_ms, scene::worst_stretch(scene), {}};
+  for (const scene::SceneBody& body : scene.bodies) out.points.push_back(body.body->positions().cast<float>());
+  return out;
+}
+
+Shot::Shot(const scene::Scene& scene, const std::vector<Snapshot>& snapshots, double aspect)
+    : scene_(scene), snapshots_(snapshots) {
+  for (const Snapshot& snapshot : snapshots) mean_ms_ += snapshot.simulate_ms;
+  if (snapshots.size() > 1) mean_ms_ /= double(snapshots.size() - 1);  // nothing is simulated for the first
+  find_bounds();
+  find_path();
+  for (const scene::SceneBody& body : scene.bodies) add_body(body);
+  add_colliders();
+  choose_camera(aspect);
+}
+
+void Shot::add_body(const scene::SceneBody& body) {
+  Drawn drawn;
+  drawn.material.color = body.color.value_or(kClothColor);
+  drawn.material.inside_color = body.inside_color.value_or(kInsideColor);
+  if (!body.triangles.empty()) {  // else sticks, made anew in every picture
+    drawn.mesh.triangles = body.triangles;
+    drawn.material.kind = render::Material::Kind::Cloth;
+    drawn.material.sheen = 0.25 * drawn.material.color + Vec3::Constant(0.09);
+    drawn.uv = body.uv;
+    drawn.thickness = kClothThickness;
+    drawn.subdivisions = body.body->size() <= 20000 ? 1 : 0;
+  }
+  drawn_.push_back(std::move(drawn));
+}
+
+void Shot::add_colliders() {
+  const auto& colliders = scene_.world.colliders();
+  for (const scene::SceneHuman& human : scene_.humans) {
+    Drawn drawn;
+    drawn.mesh = human.human.skin();
+    if (const auto& color = scene_.description.colliders[human.collider].color) drawn.material.color = *color;
+    drawn_.push_back(std::move(drawn));
+  }
+  for (std::size_t i = 0; i < colliders.size(); ++i) {
+    const bool human = std::any_of(scene_.humans.begin(), scene_.humans.end(),
+                                   [&](const scene::SceneHuman& each) { return each.collider == i; });
+    if (human || colliders[i].shapes.empty() || std::holds_alternative<HalfSpace>(colliders[i].shapes[0])) continue;
+    colliders_.push_back(i);
+    Drawn drawn;
+    drawn.material.color = scene_.description.colliders[i].color.value_or(kSolidColor);
+    drawn_.push_back(std::move(drawn));
+  }
+}
+
+std::vector<Shape> Shot::shapes_at(std::size_t collider, double shown_time) const {
+  const Collider& solid = scene_.world.colliders()[collider];
+  std::vector<Shape> shapes = solid.shapes;
+  if (solid.motion) solid.motion(shown_time + scene_.description.preroll, shapes);
+  return shapes;
+}
+
+void Shot::find_bounds() {
+  Vec3 low = Vec3::Constant(1e300), high = -low;
+  const auto cover = [&](const Vec3& x, double radius) {
+    low = low.cwiseMin((x.array() - radius).matrix());
+    high = high.cwiseMax((x.array() + radius).matrix());
+  };
+  std::optional<double> floor;
+  for (const Snapshot& snapshot : snapshots_) {
+    for (const Points<float>& points : snapshot.points) {
+      if (points.rows() == 0) continue;
+      cover(points.colwise().minCoeff().matrix().transpose().cast<double>(), 0);
+      cover(points.colwise().maxCoeff().matrix().transpose().cast<double>(), 0);
+    }
+    for (std::size_t i = 0; i < scene_.world.colliders().size(); ++i)
+      for (const Shape& shape : shapes_at(i, snapshot.time)) {
+        if (const auto* half = std::get_if<HalfSpace>(&shape)) {
+          if (half->normal.y() > 0.999) floor = std::max(floor.value_or(half->offset), half->offset);
+        } else if (const auto* sphere = std::get_if<Sphere>(&shape)) {
+          cover(sphere->center, sphere->radius);
+        } else {
+          const auto& capsule = std::get<Capsule>(shape);
+          cover(capsule.a, capsule.radius);
+          cover(capsule.b, capsule.radius);
+        }
+      }
+  }
+  if (low.x() > high.x()) low = Vec3::Zero(), high = Vec3::Ones();
+  // Without a floor everything hangs a little above that of the stage.
+  const double gap = 0.15 * (high - low).norm();
+  lift_ = floor ? -*floor : std::max(0.0, gap - low.y());
+  lower_ = low, upper_ = high;
+  lower_.y() += lift_;
+  upper_.y() += lift_;
+}
+
+void Shot::find_path() {
+  path_.assign(snapshots_.size(), Vec3::Zero());
+  if (scene_.humans.empty()) return;
+  const human::Human& human = scene_.humans[0].human;
+  std::vector<io::JointFrame> joints(human.joint_names().size());
+  for (std::size_t i = 0; i < path_.size(); ++i) {
+    path_[i] = followed(human, snapshots_[i].time, human.start_time(), joints);
+    path_[i].y() = 0;
+  }
+}
+
+void Shot::choose_camera(double aspect) {
+  if (const auto& given = scene_.description.camera) {
+    camera_.eye = given->eye + Vec3(0, lift_, 0);
+    camera_.target = given->target + Vec3(0, lift_, 0);
+    camera_.vertical_fov_degrees = given->fov;
+    if (!given->follow) path_.assign(path_.size(), Vec3::Zero());
+    return;
+  }
+  if (scene_.humans.empty()) {
+    camera_ = render::frame_subject(lower_, upper_, {-0.45, -0.30, -1}, 30, aspect, 0.10);
+    return;
+  }
+  const double height = std::get<human::HumanSettings>(scene_.description.colliders[scene_.humans[0].collider].solid).height;
+  camera_ = render::frame_subject({-0.45 * height, 0, -0.45 * height}, {0.45 * height, 1.12 * height, 0.45 * height},
+                                  {-0.6, -0.12, -1}, 28, aspect, 0.04);
+}
+
+render::Camera Shot::camera_at(std::size_t frame) const {
+  render::Camera camera = camera_;
+  camera.eye += path_[frame];
+  camera.target += path_[frame];
+  return camera;
+}
+
+render::Look Shot::look() const { return render::look_for(camera_at(0)); }
+
+void Shot::place(std::size_t frame) {
+  const Snapshot& snapshot = snapshots_[frame];
+  std::size_t next = 0;
+  for (std::size_t b = 0; b < scene_.bodies.size(); ++b) {
+    TriangleMesh& mesh = drawn_[next++].mesh;
+    const Points<double> points = snapshot.points[b].cast<double>();
+    if (!scene_.bodies[b].triangles.empty()) {
+      mesh.vertices = points;
+      continue;
+    }
+    mesh = {};
+    std::vector<std::pair<int, int>> sticks;
+    for (const softbody::Spring& spring : scene_.bodies[b].network->springs)
+      if (Index(sticks.size()) < kMostSticks) sticks.emplace_back(spring.a, spring.b);
+    if (points.rows() <= kMostSticks)
+      append_sticks(points, sticks, 0.004 * std::max(0.05, (upper_ - lower_).norm()), mesh);
+  }
+  for (const scene::SceneHuman& human : scene_.humans) human.human.skin(snapshot.time, drawn_[next++].mesh.vertices);
+  for (const std::size_t collider : colliders_) {
+    TriangleMesh& mesh = drawn_[next++].mesh;
+    mesh = {};
+    for (const Shape& shape : shapes_at(collider, snapshot.time)) append_shape(shape, mesh);
+  }
+  for (Drawn& drawn : drawn_) drawn.mesh.vertices.col(1) += lift_;
+}
+
+std::vector<std::string> Shot::caption(std::size_t frame) const {
+  const scene::SceneDescription& d = scene_.description;
+  std::vector<std::string> lines{d.title.empty() ? d.file : d.title};
+  Index points = 0;
+  for (const scene::SceneBody& body : scene_.bodies) points += body.body->size();
+  char text[200];
+  if (!scene_.bodies.empty()) {
+    const scene::MotionFacts facts = scene::motion_facts(*scene_.bodies[0].body);
+    std::snprintf(text, sizeof text, "%ld points, %s, %s, step %.3g ms", long(points), facts.method.c_str(),
+                  facts.precision.c_str(), 1e3 * scene_.world.clock().tick() / double(std::max<Index>(1, facts.substeps)));
+    lines.emplace_back(text);
+  }
+  std::snprintf(text, sizeof text, "%.3g ms a frame, worst stretch %.1f %%", mean_ms_,
+                100 * snapshots_[frame].worst_stretch);
+  lines.emplace_back(text);
+  return lines;
+}
+
+render::Image Shot::draw(render::Stage& stage, std::size_t frame) {
+  place(frame);
+  std::vector<render::Model> models;
+  for (const Drawn& drawn : drawn_) {
+    if (drawn.mesh.vertices.rows() == 0 || drawn.mesh.triangles.empty()) continue;
+    render::Model model;
+    model.mesh = &drawn.mesh;
+    model.material = drawn.material;
+    if (drawn.uv.rows() > 0) model.uv = &drawn.uv;
+    model.thickness = drawn.thickness;
+    model.subdivisions = drawn.subdivisions;
+    models.push_back(model);
+  }
+  return stage.draw(models, camera_at(frame), caption(frame));
+}
+
+}  // namespace hooke::command
