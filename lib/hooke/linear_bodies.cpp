@@ -150,7 +150,8 @@ void LinearBodies<S>::answer(const Event& event, double t) {
   if (event.other < 0) {
     const Vec3& n = planes_[event.collider].normal;
     const double approach = -n.dot(flight.v);
-    if (approach <= rest_speed_) {
+    const double e = std::max(e_a, plane_restitution_[event.collider]);
+    if (e * approach <= rest_speed_) {
       // Stays: no normal velocity, and nothing presses it in for the rest of the substep.
       flight.v += approach * n;
       // Rounding must not leave a trace of the normal velocity, or rest would never be exact.
@@ -160,7 +161,6 @@ void LinearBodies<S>::answer(const Event& event, double t) {
       if (approach > 0) impacts_.push_back({t + event.when, event.body, -1, approach / wa * n, approach});
       return;
     }
-    const double e = std::max(e_a, plane_restitution_[event.collider]);
     flight.v += (1 + e) * approach * n;
     impacts_.push_back({t + event.when, event.body, -1, (1 + e) * approach / wa * n, approach});
     return;
@@ -171,7 +171,8 @@ void LinearBodies<S>::answer(const Event& event, double t) {
   const double wb = double(this->points_.inverse_mass[event.other]);
   const Vec3 n = (other.x - flight.x).normalized();
   const double approach = (flight.v - other.v).dot(n);
-  const double e = approach <= rest_speed_ ? 0 : std::max(e_a, bodies_[std::size_t(event.other)].restitution);
+  double e = std::max(e_a, bodies_[std::size_t(event.other)].restitution);
+  if (e * approach <= rest_speed_) e = 0;
   const Vec3 impulse = -(1 + e) * approach / (wa + wb) * n;
   flight.v += wa * impulse;
   other.v -= wb * impulse;

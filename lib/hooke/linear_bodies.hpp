@@ -37,8 +37,8 @@ struct Impact {
 ///
 /// Impact times are solved within the substep, as many as there are, on the parabola that
 /// the method's step defines (exact where the acceleration is constant). Impulses are
-/// equal and opposite; an immovable body takes its impulse without moving. Below
-/// `rest_speed` a body stays on the half-space it met. Pairs that meet: ball and ball, ball
+/// equal and opposite; an immovable body takes its impulse without moving. A body that
+/// would leave a half-space slower than `rest_speed` stays on it. Pairs that meet: ball and ball, ball
 /// or box and half-space. No friction and no rotation. Cost: all pairs, every substep.
 template <class S>
 class LinearBodies final : public PointBody<S> {
