@@ -2,11 +2,20 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <limits>
 #include <stdexcept>
 #include <string>
 
 namespace hooke {
+
+namespace {
+
+// Speeds below this count as none [m/s]: their squares leave the range of double.
+template <class S>
+constexpr double kStandstill = std::is_same_v<S, float> ? 1e-20 : 1e-100;
+
+}  // namespace
 
 template <class S>
 SolveResult Integrator<S>::step(Dynamics<S>& dynamics, Points<S>& x, Points<S>& v, double t, double h) {
@@ -117,8 +126,9 @@ SolveResult Integrator<S>::run(const RungeKutta& table, Dynamics<S>& dynamics, P
   return {};
 }
 
-// (M + h²K + hD) solution = right on the free points, by conjugate gradients. Returns false
-// where the matrix shows a direction of negative curvature (only possible without `safe`).
+// (M + h²K + hD) solution = right on the free points, by conjugate gradients with M as
+// preconditioner: errors count as velocities, so light points next to heavy ones are solved
+// as well as those. Returns false where the matrix shows a direction of negative curvature (only possible without `safe`).
 template <class S>
 bool Integrator<S>::solve_linear(Dynamics<S>& dynamics, S h, bool safe, double tolerance, const Points<S>& x,
                                  const Points<S>& v, const Points<S>& right, Points<S>& solution) {
@@ -127,31 +137,53 @@ bool Integrator<S>::solve_linear(Dynamics<S>& dynamics, S h, bool safe, double t
   const auto hold = [&](Points<S>& p) {
     for (int k = 0; k < 3; ++k) p.col(k) = (inverse_mass == S(0)).select(S(0), p.col(k));
   };
+  const auto precondition = [&] {
+    preconditioned_.resize(x.rows(), 3);
+    for (int k = 0; k < 3; ++k) preconditioned_.col(k) = inverse_mass * residual_.col(k);
+  };
   const auto dot = [](const Points<S>& p, const Points<S>& q) {
     return (p.template cast<double>() * q.template cast<double>()).sum();
   };
   solution.setZero(x.rows(), 3);
   residual_ = right;
   hold(residual_);
-  direction_ = residual_;
-  double rr = dot(residual_, residual_);
-  const double target = rr * tolerance * tolerance;
+  precondition();
+  direction_ = preconditioned_;
+  double slope = dot(residual_, preconditioned_), size = dot(preconditioned_, preconditioned_);
+  const double target = size * tolerance * tolerance;
   const Index limit = 10 * 3 * x.rows() + 100;
-  for (Index i = 0; i < limit && rr > target && rr > 0; ++i) {
+  for (Index i = 0; i < limit && size > target && slope > 0; ++i) {
     product_.resize(x.rows(), 3);
     for (int k = 0; k < 3; ++k) product_.col(k) = mass * direction_.col(k);
     dynamics.add_implicit_times(x, v, h, safe, direction_, product_);
     hold(product_);
     const double curvature = dot(direction_, product_);
     if (!(curvature > 0)) return false;
-    const double alpha = rr / curvature;
+    const double alpha = slope / curvature;
     solution += S(alpha) * direction_;
     residual_ -= S(alpha) * product_;
-    const double next = dot(residual_, residual_);
-    direction_ = residual_ + S(next / rr) * direction_;
-    rr = next;
+    precondition();
+    const double next = dot(residual_, preconditioned_);
+    direction_ = preconditioned_ + S(next / slope) * direction_;
+    slope = next;
+    size = dot(preconditioned_, preconditioned_);
   }
   return true;
+}
+
+// How much h a at (stage_x_, stage_v_) moves when every coordinate is off by its rounding.
+template <class S>
+double Integrator<S>::rounding_of_force(Dynamics<S>& dynamics, S h) {
+  if (stage_x_.size() == 0) return 0;
+  // Neighbours must err in different directions: signs from the bits of a multiplied index.
+  direction_ = (std::numeric_limits<S>::epsilon() / h) * stage_x_.abs();
+  for (Index i = 0; i < direction_.size(); ++i)
+    if ((std::uint32_t(i) * 2654435761u) >> 31) direction_.data()[i] *= S(-1);
+  product_.setZero(stage_x_.rows(), 3);
+  dynamics.add_implicit_times(stage_x_, stage_v_, h, true, direction_, product_);
+  for (int k = 0; k < 3; ++k) product_.col(k) *= dynamics.inverse_mass();
+  const double found = double(product_.abs().maxCoeff());
+  return std::isfinite(found) ? found : 0;
 }
 
 template <class S>
@@ -176,12 +208,15 @@ SolveResult Integrator<S>::run(const Implicit& scheme, Dynamics<S>& dynamics, Po
   };
   stage_v_ = v;
   double residual = miss(stage_v_, stage_x_, right_);
+  double rounding = -1;
   SolveResult result;
   for (int iteration = 0;; ++iteration) {
     const double scale = std::max({double(stage_v_.abs().maxCoeff()), double(v.abs().maxCoeff()),
-                                   h * double(acceleration_.abs().maxCoeff()), std::numeric_limits<double>::min()});
+                                   h * double(acceleration_.abs().maxCoeff()), kStandstill<S>});
     result.residual = residual / scale;
-    result.converged = result.residual <= tolerance;
+    // Large forces that balance leave a rest that is nothing but the rounding of positions.
+    if (rounding < 0) rounding = rounding_of_force(dynamics, step);
+    result.converged = residual <= std::max(tolerance * scale, rounding);
     if (result.converged || iteration == scheme.max_iterations || !std::isfinite(residual)) break;
     for (int k = 0; k < 3; ++k) right_.col(k) *= mass;
     // The exact stiffness converges quadratically but may be indefinite in compressed springs.

@@ -72,12 +72,14 @@ class Integrator {
   bool solve_linear(Dynamics<S>&, S h, bool safe, double tolerance, const Points<S>& x, const Points<S>& v,
                     const Points<S>& right, Points<S>& solution);
 
+  double rounding_of_force(Dynamics<S>&, S h);
+
   const Method* method_;
   bool acceleration_known_ = false;  // acceleration_ is a(x, v, t) of the coming step's start
   double increment_step_ = 0;        // the h that increment_ was made with; 0: not made yet
   Points<S> acceleration_, increment_, from_, predicted_;
   std::vector<Points<S>> stage_velocity_, stage_acceleration_;
-  Points<S> stage_x_, stage_v_, residual_, right_, direction_, product_, trial_x_, trial_v_, update_;
+  Points<S> stage_x_, stage_v_, residual_, preconditioned_, right_, direction_, product_, trial_x_, trial_v_, update_;
 };
 
 extern template class Integrator<float>;

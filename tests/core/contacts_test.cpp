@@ -1,0 +1,231 @@
+// Points against prescribed solids: nothing passes, nothing creeps, nothing is thrown out.
+#include "core/problems.hpp"
+
+#include <numbers>
+
+namespace hooke::test {
+namespace {
+
+constexpr double kTickRate = 240;
+
+template <class S>
+PointBody<S>& add_point(World& world, const Vec3& x, const Vec3& v, double thickness = 0, double dt = 0,
+                        const Method& method = semi_implicit_euler()) {
+  MotionSettings settings = motion(method, dt);
+  settings.thickness = thickness;
+  return world.add(body_of(point<S>(x, v), settings));
+}
+
+Collider solid(Shape shape, double friction = 0, double restitution = 0) {
+  return {"solid", {shape}, {}, {}, friction, restitution};
+}
+
+Collider moving(std::function<Shape(double)> shape, double friction = 0) {
+  return {"mover", {shape(0)}, [shape](double t, std::span<Shape> out) { out[0] = shape(t); }, {}, friction, 0};
+}
+
+template <class S>
+class Contact : public ::testing::Test {
+ public:
+  // A point of a tick's rounding: 1e-6 m in float, 1e-12 m in double.
+  static constexpr double kTolerance = 20 * kUnit<S>;
+};
+TYPED_TEST_SUITE(Contact, Scalars);
+
+TYPED_TEST(Contact, KeepsTheThicknessFromEveryShape) {
+  using S = TypeParam;
+  for (const Method* method : methods())
+    for (const Shape& shape : {Shape(HalfSpace{{0, 1, 0}, 0.3}), Shape(Sphere{{0, -0.2, 0}, 0.5}),
+                               Shape(Capsule{{-1, -0.2, 0}, {1, -0.2, 0}, 0.5})}) {
+      SCOPED_TRACE(std::string(method->name) + ", shape " + std::to_string(shape.index()));
+      World world(kTickRate);
+      world.add_collider(solid(shape));
+      auto& body = add_point<S>(world, {0, 0.5, 0}, {0, 0, 0}, 0.02, 0, *method);
+      for (int frame = 0; frame < 120; ++frame) {
+        ASSERT_TRUE(world.update(1.0 / 60).good());
+        EXPECT_GE(signed_distance(shape, row(body.positions(), 0)), 0.02 - this->kTolerance);
+      }
+      EXPECT_NEAR(signed_distance(shape, row(body.positions(), 0)), 0.02, this->kTolerance);
+      EXPECT_NEAR(body.speed(0), 0, 1e-5);
+    }
+}
+
+TYPED_TEST(Contact, BouncesByTheRestitution) {
+  using S = TypeParam;
+  World world(kTickRate);
+  world.enable_gravity(false);
+  world.add_collider(solid(HalfSpace{{0, 1, 0}, 0}, 0, 0.6));
+  auto& body = add_point<S>(world, {0, 0.1, 0}, {1, -2, 0});
+  ASSERT_TRUE(world.update(0.5).good());
+  EXPECT_NEAR(body.velocities()(0, 1), 1.2, 1e-6);
+  EXPECT_NEAR(body.velocities()(0, 0), 1, 1e-6);
+}
+
+TYPED_TEST(Contact, StopsAPointOfAThousandMetresASecondAtAThinRod) {
+  using S = TypeParam;
+  Random random;
+  SCOPED_TRACE(random.trace());
+  for (const double dt : {1.0 / 60, 1.0 / 240, 1e-3}) {
+    for (int shot = 0; shot < 20; ++shot) {
+      SCOPED_TRACE(std::to_string(dt) + " s, shot " + std::to_string(shot));
+      World world(60);
+      world.enable_gravity(false);
+      world.add_collider(solid(Capsule{{-1, 0, 0}, {1, 0, 0}, 0.005}));
+      // Straight at the axis, from wherever.
+      const double angle = random.uniform(0, 2 * std::numbers::pi);
+      const Vec3 away{0, std::cos(angle), std::sin(angle)};
+      auto& body = add_point<S>(world, random.uniform(1, 20) * away, -1000 * away, 0, dt);
+      for (int frame = 0; frame < 3; ++frame) ASSERT_TRUE(world.update(1.0 / 60).good());
+      EXPECT_GE(row(body.positions(), 0).dot(away), 0.005 - 1e-4);
+      EXPECT_LT(row(body.positions(), 0).norm(), 0.02);
+    }
+  }
+}
+
+TYPED_TEST(Contact, OfAFastLimbPushesARestingPointAlong) {
+  using S = TypeParam;
+  for (const double dt : {1.0 / 60, 1.0 / 240}) {
+    SCOPED_TRACE(dt);
+    World world(60);
+    world.enable_gravity(false);
+    const auto limb = [](double t) { return Shape(Capsule{{-2 + 20 * t, -1, 0}, {-2 + 20 * t, 1, 0}, 0.05}); };
+    world.add_collider(moving(limb));
+    auto& body = add_point<S>(world, {0, 0, 0}, {0, 0, 0}, 0, dt);
+    ASSERT_TRUE(world.update(0.2).good());
+    // Ahead of the limb, not behind it.
+    EXPECT_GE(body.positions()(0, 0), -2 + 20 * world.time() + 0.05 - 1e-3);
+    EXPECT_NEAR(body.velocities()(0, 0), 20, 0.1);
+  }
+}
+
+// The speed down an incline of that angle after five seconds, and how far it went.
+struct Slide {
+  double speed, way, lift;
+};
+template <class S>
+Slide slide(double angle, double friction, const Method& method) {
+  World world(kTickRate);
+  const Vec3 normal{std::sin(angle), std::cos(angle), 0}, down{std::cos(angle), -std::sin(angle), 0};
+  world.add_collider(solid(HalfSpace{normal, 0}, friction));
+  auto& body = add_point<S>(world, {0, 0, 0}, {0, 0, 0}, 0, 0, method);
+  for (int frame = 0; frame < 300; ++frame) EXPECT_TRUE(world.update(1.0 / 60).good());
+  const Vec3 x = row(body.positions(), 0);
+  return {row(body.velocities(), 0).dot(down), x.dot(down), x.dot(normal)};
+}
+
+TYPED_TEST(Contact, SticksOnAnInclineBelowTheAngleOfFriction) {
+  using S = TypeParam;
+  for (const Method* method : methods()) {
+    SCOPED_TRACE(method->name);
+    const Slide stuck = slide<S>(0.4, 0.5, *method);  // tan 0.4 = 0.4228
+    EXPECT_NEAR(stuck.way, 0, 1e-6);
+    EXPECT_NEAR(stuck.speed, 0, 1e-6);
+  }
+}
+
+TYPED_TEST(Contact, SlidesOnAnInclineAboveTheAngleOfFriction) {
+  using S = TypeParam;
+  for (const Method* method : methods()) {
+    SCOPED_TRACE(method->name);
+    const double angle = 0.6, friction = 0.3;
+    const double a = 9.81 * (std::sin(angle) - friction * std::cos(angle));
+    const Slide sliding = slide<S>(angle, friction, *method);
+    EXPECT_NEAR(sliding.speed, 5 * a, 0.01 * 5 * a);
+    EXPECT_NEAR(sliding.way, 12.5 * a, 0.01 * 12.5 * a);
+    EXPECT_NEAR(sliding.lift, 0, 1e-4);
+  }
+}
+
+TYPED_TEST(Contact, WithADistanceCallbackIsThatOfTheShapeItself) {
+  using S = TypeParam;
+  const auto fall = [](Collider collider) {
+    World world(kTickRate);
+    world.add_collider(std::move(collider));
+    auto& body = add_point<S>(world, {0.1, 1, 0.05}, {0, 0, 0}, 0.01);
+    std::vector<Vec3> path;
+    for (int frame = 0; frame < 90; ++frame) {
+      EXPECT_TRUE(world.update(1.0 / 60).good());
+      path.push_back(row(body.positions(), 0));
+    }
+    return path;
+  };
+  const Sphere sphere{{0, 0, 0}, 0.5};
+  Collider callback{"callback", {}, {}, {}, 0.1, 0};
+  callback.distance = [&](double, const Points<double>& x, Values<double>& distance, Points<double>& normal) {
+    for (Index i = 0; i < x.rows(); ++i) {
+      distance[i] = signed_distance(sphere, row(x, i));
+      normal.row(i) = (row(x, i) - sphere.center).normalized().transpose().array();
+    }
+  };
+  const auto built_in = fall(solid(sphere, 0.1)), called = fall(callback);
+  for (std::size_t i = 0; i < built_in.size(); ++i) EXPECT_LT((built_in[i] - called[i]).norm(), 2e-3) << "frame " << i;
+}
+
+TYPED_TEST(Contact, WithASphereThatMovesCarriesAPointByFriction) {
+  using S = TypeParam;
+  World world(kTickRate);
+  const auto ball = [](double t) { return Shape(Sphere{{0.5 * t * t, 0, 0}, 1}); };  // 1 m/s²
+  world.add_collider(moving(ball, 0.8));
+  auto& body = add_point<S>(world, {0, 1, 0}, {0, 0, 0});
+  ASSERT_TRUE(world.update(1).good());
+  EXPECT_NEAR(body.positions()(0, 0), 0.5, 5e-3);
+  EXPECT_NEAR(body.velocities()(0, 0), 1, 2e-2);
+  // Without friction it stays behind.
+  World slippery(kTickRate);
+  slippery.add_collider(moving(ball, 0));
+  auto& left = add_point<S>(slippery, {0, 1, 0}, {0, 0, 0});
+  ASSERT_TRUE(slippery.update(0.3).good());
+  EXPECT_LT(left.positions()(0, 0), 0.02);
+}
+
+TYPED_TEST(Contact, PushesAStartInsideOutAtABoundedSpeed) {
+  using S = TypeParam;
+  for (const Method* method : methods())
+    for (const Shape& shape : {Shape(HalfSpace{{0, 1, 0}, 0.4}), Shape(Sphere{{0, -0.1, 0}, 0.5}),
+                               Shape(Capsule{{-1, -0.1, 0}, {1, -0.1, 0}, 0.5})}) {
+      SCOPED_TRACE(std::string(method->name) + ", shape " + std::to_string(shape.index()));
+      World world(kTickRate);
+      world.add_collider(solid(shape));
+      auto& body = add_point<S>(world, {0, 0, 0}, {0, 0, 0}, 0, 0, *method);
+      Vec3 before = row(body.positions(), 0);
+      for (int tick = 0; tick < kTickRate; ++tick) {
+        ASSERT_TRUE(world.update(1 / kTickRate).good());
+        const Vec3 now = row(body.positions(), 0);
+        EXPECT_LE((now - before).norm() * kTickRate, 2 + 9.81 / kTickRate + 1e-3) << "tick " << tick;
+        EXPECT_LE(body.speed(0), 2 + 9.81 / kTickRate);
+        before = now;
+      }
+      EXPECT_NEAR(signed_distance(shape, before), 0, 1e-5);
+    }
+}
+
+TYPED_TEST(Contact, IsIgnoredByABodyThatDoesNotCollide) {
+  using S = TypeParam;
+  World world(kTickRate);
+  world.add_collider(solid(HalfSpace{}));
+  MotionSettings settings;
+  settings.collides = false;
+  auto& body = world.add(body_of(point<S>({0, 0.1, 0}, {0, 0, 0}), settings));
+  ASSERT_TRUE(world.update(1).good());
+  EXPECT_NEAR(body.positions()(0, 1), 0.1 - 9.81 / 2, 1e-4);
+}
+
+TYPED_TEST(Contact, OnAFloorStaysStillForMinutes) {
+  using S = TypeParam;
+  World world(kTickRate);
+  world.add_collider(solid(HalfSpace{}, 0.3));
+  auto& body = add_point<S>(world, {0.3, 0, 0.7}, {0, 0, 0});
+  ASSERT_TRUE(world.update(1).good());
+  const Vec3 settled = row(body.positions(), 0);
+  ASSERT_TRUE(world.update(120).good());
+  EXPECT_EQ(row(body.positions(), 0), settled);
+}
+
+TEST(Colliders, RefuseWhatMakesNoSense) {
+  World world;
+  EXPECT_THROW(world.add_collider(solid(HalfSpace{}, -1)), std::invalid_argument);
+  EXPECT_THROW(world.add_collider(solid(HalfSpace{}, 0, 1.5)), std::invalid_argument);
+}
+
+}  // namespace
+}  // namespace hooke::test
