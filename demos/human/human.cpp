@@ -1,4 +1,5 @@
 #include <hooke/error.hpp>
+#include <human/clearance.hpp>
 #include <human/human.hpp>
 
 #include <algorithm>
@@ -22,6 +23,22 @@ void require(bool holds, const std::string& rule, double value) {
 }
 
 double smootherstep(double u) { return u * u * u * (10 + u * (6 * u - 15)); }
+
+// The rest stance with the arms raised until elbows, forearms and hands are clear of the trunk.
+Stance clear_stance(const Body& body, double wanted) {
+  const LimbGroups groups = limb_groups(body.capsules);
+  std::vector<io::JointFrame> joints(static_cast<std::size_t>(body.motion.joint_count()));
+  std::vector<Capsule> arm(groups.left_arm.size());
+  std::vector<Capsule> trunk(groups.trunk.size());
+  Stance stance = rest_stance;
+  for (; wanted > 0 && stance.arms < 60 * degree; stance.arms += 0.5 * degree) {
+    io::global_pose(body.motion, standing(body, stance), joints);
+    place_capsules(groups.left_arm, joints, arm);
+    place_capsules(groups.trunk, joints, trunk);
+    if (nearest_pair(arm, trunk).gap > wanted) break;
+  }
+  return stance;
+}
 
 // Lowest point of the body in every frame.
 std::vector<double> lowest_points(const Body& body, const io::Motion& motion) {
@@ -109,13 +126,14 @@ struct Human::Parts {
   HumanSettings settings;
   double freeze_time = 0;
   Body body;
-  io::Motion shown;  // in shown time, from rest to the frozen pose
+  io::Motion shown;  // from rest to the frozen pose, not yet slowed down in the end
   std::optional<Skinning> skinning;
 
   double recording_time(double t) const;
   void pose(double t, std::span<io::JointFrame> out) const;
   io::LocalPose rest_pose() const;
   void make_shown();
+  void keep_arms_clear();
   void stand_on_floor();
   void centre();
 };
@@ -130,7 +148,7 @@ double Human::Parts::recording_time(double t) const {
 
 void Human::Parts::pose(double t, std::span<io::JointFrame> out) const {
   io::LocalPose& local = scratch(out.size(), body.capsules.size()).pose;
-  io::local_pose(shown, std::min(t, freeze_time), local);
+  io::local_pose(shown, recording_time(t) - settings.from, local);
   io::global_pose(shown, local, out);
 }
 
@@ -138,15 +156,16 @@ io::LocalPose Human::Parts::rest_pose() const {
   io::LocalPose begin;
   io::local_pose(body.motion, settings.from, begin);
   const Vec3 ahead = begin.rotations[0] * Vec3::UnitZ();
-  io::LocalPose rest = standing(body, rest_stance);
+  io::LocalPose rest = standing(body, clear_stance(body, settings.limb_gap));
   rest.rotations[0] = Quat(Eigen::AngleAxisd(std::atan2(ahead.x(), ahead.z()), Vec3::UnitY())) * rest.rotations[0];
   rest.root.x() = begin.root.x();
   rest.root.z() = begin.root.z();
   return rest;
 }
 
-// Frames of rest pose, blend and recording at the recording's rate; beyond either end a few
-// more of the same pose, so that splines and filters end at rest.
+// Frames of rest pose, blend and recording; beyond either end a few more, so that splines and
+// filters know how it goes on. Playback slows down later, when a pose is asked for: whatever
+// is corrected here comes to rest with it.
 void Human::Parts::make_shown() {
   constexpr int margin = 30;
   const io::LocalPose rest = rest_pose();
@@ -157,12 +176,13 @@ void Human::Parts::make_shown() {
   shown.first_time = std::floor(start * rate) / rate - margin / rate;
   shown.root_positions.clear();
   shown.rotations.clear();
-  const int frames = static_cast<int>(std::ceil((freeze_time - shown.first_time) * rate)) + margin;
+  const double end = settings.until - settings.from;
+  const int frames = static_cast<int>(std::ceil((end - shown.first_time) * rate)) + margin;
   io::LocalPose pose;
   for (int f = 0; f < frames; ++f) {
     const double t = shown.first_time + f / rate;
     const double w = smootherstep(std::clamp(1 + t / settings.blend_in, 0.0, 1.0));
-    io::local_pose(body.motion, recording_time(t), pose);
+    io::local_pose(body.motion, settings.from + t, pose);
     shown.root_positions.push_back(rest.root + w * (pose.root - rest.root));
     for (std::size_t j = 0; j < pose.rotations.size(); ++j) {
       Quat q = w < 1 ? rest.rotations[j].slerp(w, pose.rotations[j]) : pose.rotations[j];
@@ -170,6 +190,14 @@ void Human::Parts::make_shown() {
       shown.rotations.push_back(q);
     }
   }
+}
+
+void Human::Parts::keep_arms_clear() {
+  if (settings.limb_gap == 0) return;
+  constexpr double reach = 0.3;  // [s]
+  const double still = -settings.blend_in - shown.first_time;
+  human::keep_arms_clear(shown, body, settings.limb_gap, reach,
+                         static_cast<Index>(std::ceil(still * shown.frame_rate)));
 }
 
 void Human::Parts::stand_on_floor() {
@@ -197,6 +225,8 @@ Human::Human(const HumanSettings& settings) {
           "settle must be in [0, until - from] s", settings.settle);
   require(settings.hold >= 0, "hold must not be negative", settings.hold);
   require(settings.blend_in > 0, "blend_in must be positive", settings.blend_in);
+  require(settings.limb_gap >= 0 && settings.limb_gap < 0.1 * settings.height, "limb_gap must be in [0, height/10) m",
+          settings.limb_gap);
   if (!std::filesystem::exists(settings.motion))
     throw Error("Human: there is no motion file " + settings.motion.string() +
                 "; install the Debian package assimp-testmodels (apt-get install assimp-testmodels)");
@@ -212,6 +242,7 @@ Human::Human(const HumanSettings& settings) {
   require(settings.until <= motion.last_time(), "until must lie within the recording", settings.until);
   io::low_pass(motion, settings.filter_hz);
   parts->make_shown();
+  parts->keep_arms_clear();
   parts->stand_on_floor();
   parts->centre();
   parts->skinning.emplace(parts->body, standing(parts->body, bind_stance), settings.skin);

@@ -27,6 +27,9 @@ struct HumanSettings {
   double blend_in = 1.5;  ///< [s] from the rest pose into the recording, ends at t = 0
   double settle = 0.3;    ///< [s] over which playback slows down to a stop
   double filter_hz = 8;   ///< [Hz] low-pass of the recording
+  /// [m] how far arms are kept from trunk and thighs, surface to surface: room for cloth that
+  /// keeps its distance from both. More turns the arms farther out; 0 leaves them as recorded.
+  double limb_gap = 0.036;
   SkinSettings skin;
 };
 

@@ -283,6 +283,8 @@ TEST(HumanErrors, RefuseSettingsOutOfRange) {
   refused([](auto& s) { s.blend_in = 0; });
   refused([](auto& s) { s.settle = -1; });
   refused([](auto& s) { s.filter_hz = 0; });
+  refused([](auto& s) { s.limb_gap = -0.01; });
+  refused([](auto& s) { s.limb_gap = 0.5; });
 }
 
 }  // namespace
