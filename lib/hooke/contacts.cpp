@@ -84,6 +84,7 @@ void Contacts<S>::begin_tick(std::span<const Collider> colliders, const PointMas
   place_solids(t1, previous_);
   place_solids(t0, solids_);
   candidates_.clear();
+  touches_.clear();
   if (points.size() == 0 || solids_.empty()) return;
   solid_move_.resize(solids_.size());
   for (std::size_t s = 0; s < solids_.size(); ++s) {
@@ -183,9 +184,22 @@ bool Contacts<S>::entry(const Solid& solid, const Vec& from, const Vec& to, Vec&
   return true;
 }
 
+// Removes the approach from a velocity relative to the surface, and of the sliding what Coulomb's
+// friction takes. Returns the approach, 0 where there was none.
+template <class S>
+S Contacts<S>::rub(const Vec& normal, S friction, Vec& relative) {
+  const S approach = -relative.dot(normal);
+  if (!(approach > 0)) return S(0);
+  relative += approach * normal;
+  const S sliding = relative.norm();
+  if (sliding > 0) relative *= std::max(S(0), 1 - friction * approach / sliding);
+  return approach;
+}
+
 // One candidate in one substep: x and v after a move that began at `from`.
 template <class S>
-void Contacts<S>::touch(const Solid& before, const Solid& after, const Vec& from, S move, S h, Vec& x, Vec& v) const {
+void Contacts<S>::touch(Index point, const Solid& before, const Solid& after, const Vec& from, S move, S h, Vec& x,
+                        Vec& v) {
   Surface at = surface(after, x);
   if (at.gap >= 0 && (x - from).norm() + move <= at.gap) return;  // cannot have been inside on the way
   const Vec start = carried(before, after, from);
@@ -210,12 +224,17 @@ void Contacts<S>::touch(const Solid& before, const Solid& after, const Vec& from
 
   const Vec solid_velocity = (start - from) / h;
   Vec relative = v - solid_velocity;
-  const S approach = -relative.dot(n);
-  if (approach <= 0) return;
-  relative += approach * n;
-  const S sliding = relative.norm();
-  if (sliding > 0) relative *= std::max(S(0), 1 - after.friction * approach / sliding);
+  const S approach = rub(n, after.friction, relative);
   v = solid_velocity + relative + after.restitution * approach * n;
+  touches_.push_back({point, n, solid_velocity, after.friction});
+}
+
+template <class S>
+void Contacts<S>::settle(Points<S>& v) const {
+  for (const Touch& touch : touches_) {
+    Vec relative = row(v, touch.point) - touch.solid_velocity;
+    if (rub(touch.normal, touch.friction, relative) > 0) set_row<S>(v, touch.point, touch.solid_velocity + relative);
+  }
 }
 
 template <class S>
@@ -226,9 +245,10 @@ void Contacts<S>::resolve(double t0, const Points<S>& from, double t1, const Val
   place_solids(t1, solids_);
   now_ = t1;
   const S h = S(t1 - t0);
+  touches_.clear();
   if (!solids_.empty()) {
     // Somebody was thrown farther than a tick's bound: look again from where this substep began.
-    if (((x - start_).square().rowwise().sum().sqrt() > reach_).any()) {
+    if (((x - start_).square().rowwise().sum() > reach_.square()).any()) {
       std::swap(previous_, solids_);
       find_candidates(from, (x - from) / h, std::max(tick_end_ - t0, t1 - t0));
       std::swap(previous_, solids_);
@@ -245,7 +265,7 @@ void Contacts<S>::resolve(double t0, const Points<S>& from, double t1, const Val
                                               : std::max((after.a - before.a).norm(), (after.b - before.b).norm());
       }
       Vec place = row(x, i), velocity = row(v, i);
-      touch(before, after, row(from, i), move, h, place, velocity);
+      touch(i, before, after, row(from, i), move, h, place, velocity);
       set_row(x, i, place);
       set_row(v, i, velocity);
     }
@@ -264,7 +284,7 @@ void Contacts<S>::resolve(double t0, const Points<S>& from, double t1, const Val
       Vec place = row(x, i), velocity = row(v, i);
       solid.a = normal_.row(i).matrix().transpose().template cast<S>();
       solid.radius = solid.a.dot(place) - S(distance_[i]) + thickness_;
-      touch(solid, solid, row(from, i), S(0), h, place, velocity);
+      touch(i, solid, solid, row(from, i), S(0), h, place, velocity);
       set_row(x, i, place);
       set_row(v, i, velocity);
     }

@@ -29,6 +29,10 @@ class Contacts {
   void resolve(double t0, const Points<S>& from, double t1, const Values<S>& inverse_mass, Points<S>& x,
                Points<S>& v);
 
+  /// Takes from v what presses into the surfaces touched by the last `resolve`, and rubs: for
+  /// methods that end with a kick, which knows nothing of contacts.
+  void settle(Points<S>& v) const;
+
   /// Speed at which points that start inside a solid are pushed out [m/s].
   static constexpr double kPushSpeed = 2;
 
@@ -49,13 +53,19 @@ class Contacts {
   struct Candidate {
     int point, solid;
   };
+  struct Touch {
+    Index point;
+    Vec normal, solid_velocity;
+    S friction;
+  };
 
   void find_candidates(const Points<S>& x, const Points<S>& v, double seconds);
   void place_solids(double t, std::vector<Solid>& out);
   Surface surface(const Solid& solid, const Vec& x) const;
   static Vec carried(const Solid& before, const Solid& after, const Vec& x);
   bool entry(const Solid& solid, const Vec& from, const Vec& to, Vec& hit) const;
-  void touch(const Solid& before, const Solid& after, const Vec& from, S move, S h, Vec& x, Vec& v) const;
+  void touch(Index point, const Solid& before, const Solid& after, const Vec& from, S move, S h, Vec& x, Vec& v);
+  static S rub(const Vec& normal, S friction, Vec& relative);
 
   std::span<const Collider> colliders_;
   Vec3 origin_{0, 0, 0};
@@ -65,6 +75,7 @@ class Contacts {
   std::vector<Solid> solids_, previous_;
   std::vector<S> solid_move_;
   std::vector<Candidate> candidates_;
+  std::vector<Touch> touches_;  // of the last resolve
   std::vector<const Collider*> callbacks_;
   Points<S> start_;
   Values<S> reach_, gap_;

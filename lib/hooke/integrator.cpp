@@ -15,6 +15,9 @@ namespace {
 template <class S>
 constexpr double kStandstill = std::is_same_v<S, float> ? 1e-20 : 1e-100;
 
+// How often compressed springs are met with the positive part of their stiffness.
+constexpr int kSafeIterations = 10;
+
 }  // namespace
 
 template <class S>
@@ -61,6 +64,7 @@ SolveResult Integrator<S>::run(const Splitting& table, Dynamics<S>& dynamics, Po
       acceleration_known_ = false;
     }
   }
+  if (table.drift.back() == 0 && dynamics.collides()) dynamics.settle(v);
   return {};
 }
 
@@ -91,6 +95,7 @@ SolveResult Integrator<S>::run(const Verlet&, Dynamics<S>& dynamics, Points<S>& 
   acceleration_known_ = true;
   // The velocity of the same time as x; the increment itself is half a step behind.
   v = increment_ / step + (S(0.5) * step) * acceleration_;
+  if (dynamics.collides()) dynamics.settle(v);
   return {};
 }
 
@@ -214,27 +219,39 @@ SolveResult Integrator<S>::run(const Implicit& scheme, Dynamics<S>& dynamics, Po
     const double scale = std::max({double(stage_v_.abs().maxCoeff()), double(v.abs().maxCoeff()),
                                    h * double(acceleration_.abs().maxCoeff()), kStandstill<S>});
     result.residual = residual / scale;
-    // Large forces that balance leave a rest that is nothing but the rounding of positions.
-    if (rounding < 0) rounding = rounding_of_force(dynamics, step);
-    result.converged = residual <= std::max(tolerance * scale, rounding);
+    result.converged = result.residual <= tolerance;
     if (result.converged || iteration == scheme.max_iterations || !std::isfinite(residual)) break;
     for (int k = 0; k < 3; ++k) right_.col(k) *= mass;
     // The exact stiffness converges quadratically but may be indefinite in compressed springs.
     const double inner = std::clamp(0.01 * result.residual, 0.1 * tolerance, 1e-3);
-    if (!solve_linear(dynamics, step, false, inner, stage_x_, stage_v_, right_, update_))
+    // Where it is, the positive part alone leads downhill far away, and what the gradients found
+    // before they met the negative direction leads home.
+    const bool positive = solve_linear(dynamics, step, false, inner, stage_x_, stage_v_, right_, update_);
+    if (!positive && (iteration < kSafeIterations || (update_ == S(0)).all()))
       solve_linear(dynamics, step, true, inner, stage_x_, stage_v_, right_, update_);
+    // The step minimises an energy whose slope along the update is minus this product. A step is
+    // good where the energy still falls or has just turned, however the residual jumps meanwhile.
+    const auto slope = [&](const Points<S>& force) {
+      return (force.template cast<double>() * update_.template cast<double>()).sum();
+    };
+    const double first_slope = slope(right_);
     double best = std::numeric_limits<double>::infinity();
     S length = 1;
     for (int halving = 0; halving < 12; ++halving, length *= S(0.5)) {
       trial_v_ = stage_v_ + length * update_;
       best = miss(trial_v_, trial_x_, right_);
       if (best < residual) break;
+      for (int k = 0; k < 3; ++k) product_.col(k) = mass * right_.col(k);
+      if (std::isfinite(best) && slope(product_) > -0.9 * first_slope) break;
     }
-    if (!(best < residual) && result.residual < 100 * tolerance) {
-      // Rounding, not the method, stops it here.
-      result.converged = true;
-      miss(stage_v_, stage_x_, right_);
-      break;
+    if (iteration > 1 && !(best < 0.5 * residual)) {
+      // Large forces that balance leave a rest that is nothing but the rounding of positions.
+      if (rounding < 0) rounding = rounding_of_force(dynamics, step);
+      if (residual <= std::max(100 * tolerance * scale, rounding)) {
+        result.converged = true;
+        miss(stage_v_, stage_x_, right_);
+        break;
+      }
     }
     stage_v_ = trial_v_;
     stage_x_ = trial_x_;

@@ -30,6 +30,10 @@ class Dynamics {
   /// Keeps points out of surfaces after a move from `from` at t0 to x at t1.
   virtual void collide(double t0, const Points<S>& from, double t1, Points<S>& x, Points<S>& v) = 0;
 
+  /// Takes from v what presses into the surfaces that the last `collide` touched: the kick after
+  /// a drift knows nothing of them.
+  virtual void settle(Points<S>& v) = 0;
+
   /// True where `collide` may do anything until the next tick.
   virtual bool collides() const = 0;
 

@@ -69,6 +69,7 @@ class PointBody : public Body, protected Dynamics<S> {
   void prescribe(double t0, const Points<S>& from, double t, Points<S>& x, Points<S>& v) override;
   bool prescribes() const override { return !driven_.empty() || !moving_.empty(); }
   void collide(double t0, const Points<S>& from, double t1, Points<S>& x, Points<S>& v) override;
+  void settle(Points<S>& v) override { contacts_.settle(v); }
   bool collides() const override { return contacts_.any(); }
   const Values<S>& mass() const override { return points_.mass; }
   const Values<S>& inverse_mass() const override { return points_.inverse_mass; }

@@ -95,12 +95,13 @@ HOOKE_INLINE void wind(WindBlock<S>& s) {
     const S vy = wind_y - third * (vy0[i] + vy1[i] + vy2[i]);
     const S vz = wind_z - third * (vz0[i] + vz1[i] + vz2[i]);
     const S flow = S(0.5) * (vx * nx + vy * ny + vz * nz);  // area times normal speed, signed
-    const S size = std::sqrt(nx * nx + ny * ny + nz * nz), speed = std::sqrt(vx * vx + vy * vy + vz * vz);
-    const S through = std::abs(flow);
-    const S safe_size = size > kTiny<S> ? size : kTiny<S>, safe_speed = speed > kTiny<S> ? speed : kTiny<S>;
+    // Twice the area times the speed; both factors of the lift need no more than its inverse.
+    const S v2 = vx * vx + vy * vy + vz * vz;
+    const S root = std::sqrt((nx * nx + ny * ny + nz * nz) * v2);
+    const S inverse = S(1) / (root > kTiny<S> * kTiny<S> ? root : kTiny<S> * kTiny<S>);
     // Drag: area seen by the air × |v| v. Lift: across v, ∝ |v|² cos α sin α.
-    const S along_normal = lift * flow * speed / safe_size;
-    const S along_flow = drag * through - lift * through * (S(2) * through / safe_size) / safe_speed;
+    const S along_normal = lift * flow * v2 * inverse;
+    const S along_flow = drag * std::abs(flow) - S(2) * lift * flow * flow * inverse;
     fx[i] = along_flow * vx + along_normal * nx;
     fy[i] = along_flow * vy + along_normal * ny;
     fz[i] = along_flow * vz + along_normal * nz;
