@@ -31,7 +31,7 @@ struct RungeKutta {
 /// scale (0: 1e-12 in double, 1e-6 in float).
 struct Implicit {
   double tolerance = 0;
-  int max_iterations = 50;
+  int max_iterations = 200;
 };
 
 /// One integration method and what is known about it.

@@ -222,11 +222,13 @@ void PointBody<S>::acceleration(const Points<S>& x, const Points<S>& v, double t
   if (watching_ && culprit_ < 0) {
     for (Index i = 0; i < size() && culprit_ < 0; ++i)
       if (!x.row(i).allFinite() || !v.row(i).allFinite()) culprit_ = i;
-    for (Index i = 0; i < size() && culprit_ < 0; ++i)
-      if (!a.row(i).allFinite()) {
-        culprit_ = i;
-        fields_at_fault_ = double(x.abs().maxCoeff()) < kOrdinary && double(v.abs().maxCoeff()) < kOrdinary;
-      }
+    if (culprit_ < 0 && !a.allFinite()) {
+      // Held points last: an infinite force makes NaN of them, but it is their neighbour's.
+      for (const bool held : {true, false})
+        for (Index i = size(); i-- > 0;)
+          if ((points_.inverse_mass[i] == 0) == held && !a.row(i).allFinite()) culprit_ = i;
+      fields_at_fault_ = double(x.abs().maxCoeff()) < kOrdinary && double(v.abs().maxCoeff()) < kOrdinary;
+    }
   }
 }
 

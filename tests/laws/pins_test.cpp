@@ -6,9 +6,12 @@
 namespace hooke::test {
 namespace {
 
+/// Exactly where it was told to be, in the body's precision.
 template <class S>
-Vec3 rounded(const Vec3& x) {
-  return {double(S(x[0])), double(S(x[1])), double(S(x[2]))};
+bool is_at(const PointBody<S>& body, Index point, const Vec3& x) {
+  bool same = true;
+  for (int k = 0; k < 3; ++k) same = same && body.state().position(point, k) == S(x[k]);
+  return same;
 }
 
 // Two points on a spring; the first is pinned.
@@ -37,9 +40,9 @@ TYPED_TEST(Pin, MovedIsExactlyAtItsTargetAfterTheFrame) {
     for (const Vec3& target : targets) {
       body.move_pin(0, target);
       ASSERT_TRUE(world.update(1.0 / 60).good());
-      EXPECT_EQ(row(body.positions(), 0), rounded<S>(target));
+      EXPECT_TRUE(is_at(body, 0, target));
       ASSERT_TRUE(world.update(1.0 / 60).good());
-      EXPECT_EQ(row(body.positions(), 0), rounded<S>(target));
+      EXPECT_TRUE(is_at(body, 0, target));
       EXPECT_EQ(row(body.velocities(), 0), Vec3(0, 0, 0));
     }
     EXPECT_TRUE(body.positions().allFinite());
@@ -87,7 +90,7 @@ TYPED_TEST(Pin, DrivenByTimeIsExactlyThereAtEveryTick) {
     body.drive_pins({0}, [&](double t, Points<double>& p) { p.row(0) = place(t).transpose().array(); });
     for (int frame = 0; frame < 60; ++frame) {
       ASSERT_TRUE(world.update(1.0 / 60).good());
-      EXPECT_EQ(row(body.positions(), 0), rounded<S>(place(world.time())));
+      EXPECT_TRUE(is_at(body, 0, place(world.time())));
     }
     EXPECT_LT((row(body.positions(), 1) - row(body.positions(), 0)).norm(), 5);
   }

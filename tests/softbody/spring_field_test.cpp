@@ -207,14 +207,19 @@ TEST(RateBounds, AreNeverBelowTheTruth) {
   }
 }
 
-TEST(RateBounds, AreWithinFivePercentForAFlatGrid) {
-  const auto cloth = softbody::cloth_from_grid(1, 1, 14, 14, Vec3::UnitX(), Vec3::UnitY(), {});
-  const SpringField<double> field(cloth.network, cloth.positions);
-  const Values<double> w = cloth.masses.inverse();
-  const double truth = true_largest(field, cloth.positions, w, false);
-  const double bound = field.rate_bounds(cloth.positions, none(cloth.positions.rows()), w).omega_squared;
-  EXPECT_GE(bound, truth);
-  EXPECT_LE(bound, 1.05 * truth);
+TEST(RateBounds, AreCloseForAFlatGrid) {
+  softbody::ClothMaterial threads;
+  threads.shear = 0, threads.bend = 0;
+  // What bends and shears moves against what stretches: the bound adds what never meets.
+  for (const auto& [material, share] : {std::pair{threads, 1.05}, {softbody::ClothMaterial{}, 1.25}}) {
+    const auto cloth = softbody::cloth_from_grid(1, 1, 14, 14, Vec3::UnitX(), Vec3::UnitY(), material);
+    const SpringField<double> field(cloth.network, cloth.positions);
+    const Values<double> w = cloth.masses.inverse();
+    const double truth = true_largest(field, cloth.positions, w, false);
+    const double bound = field.rate_bounds(cloth.positions, none(cloth.positions.rows()), w).omega_squared;
+    EXPECT_GE(bound, truth);
+    EXPECT_LE(bound, share * truth);
+  }
 }
 
 TEST(SpringNetwork, RefusesBadSprings) {
