@@ -1,5 +1,6 @@
 #include <hooke/error.hpp>
 #include <human/clearance.hpp>
+#include <human/footing.hpp>
 #include <human/human.hpp>
 
 #include <algorithm>
@@ -132,6 +133,7 @@ struct Human::Parts {
   double recording_time(double t) const;
   void pose(double t, std::span<io::JointFrame> out) const;
   io::LocalPose rest_pose() const;
+  Index frame_at(double t) const;  // the first one not before t
   void make_shown();
   void keep_arms_clear();
   void stand_on_floor();
@@ -161,6 +163,10 @@ io::LocalPose Human::Parts::rest_pose() const {
   rest.root.x() = begin.root.x();
   rest.root.z() = begin.root.z();
   return rest;
+}
+
+Index Human::Parts::frame_at(double t) const {
+  return static_cast<Index>(std::ceil((t - shown.first_time) * shown.frame_rate - 1e-6));
 }
 
 // Frames of rest pose, blend and recording; beyond either end a few more, so that splines and
@@ -195,9 +201,7 @@ void Human::Parts::make_shown() {
 void Human::Parts::keep_arms_clear() {
   if (settings.limb_gap == 0) return;
   constexpr double reach = 0.3;  // [s]
-  const double still = -settings.blend_in - shown.first_time;
-  human::keep_arms_clear(shown, body, settings.limb_gap, reach,
-                         static_cast<Index>(std::ceil(still * shown.frame_rate)));
+  human::keep_arms_clear(shown, body, settings.limb_gap, reach, frame_at(-settings.blend_in));
 }
 
 void Human::Parts::stand_on_floor() {
@@ -242,8 +246,9 @@ Human::Human(const HumanSettings& settings) {
   require(settings.until <= motion.last_time(), "until must lie within the recording", settings.until);
   io::low_pass(motion, settings.filter_hz);
   parts->make_shown();
-  parts->keep_arms_clear();
   parts->stand_on_floor();
+  if (settings.plant_feet) plant_feet(parts->shown, parts->frame_at(0));
+  parts->keep_arms_clear();
   parts->centre();
   parts->skinning.emplace(parts->body, standing(parts->body, bind_stance), settings.skin);
   parts_ = std::move(parts);

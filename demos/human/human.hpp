@@ -30,6 +30,7 @@ struct HumanSettings {
   /// [m] how far arms are kept from trunk and thighs, surface to surface: room for cloth that
   /// keeps its distance from both. More turns the arms farther out; 0 leaves them as recorded.
   double limb_gap = 0.036;
+  bool plant_feet = true;  ///< hold standing feet in place, which drift in the recording
   SkinSettings skin;
 };
 
