@@ -7,6 +7,8 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <numbers>
+#include <optional>
 
 namespace hooke::command {
 
@@ -148,9 +150,12 @@ void Shot::choose_camera(double aspect) {
     camera_ = render::frame_subject(lower_, upper_, {-0.45, -0.30, -1}, 30, aspect, 0.10);
     return;
   }
-  const double height = std::get<human::HumanSettings>(scene_.description.colliders[scene_.humans[0].collider].solid).height;
-  camera_ = render::frame_subject({-0.45 * height, 0, -0.45 * height}, {0.45 * height, 1.12 * height, 0.45 * height},
-                                  {-0.6, -0.12, -1}, 28, aspect, 0.04);
+  // From the floor to the highest the figure ever reaches, at the smoothed place.
+  camera_.vertical_fov_degrees = 28;
+  const double half = 0.54 * upper_.y(), slope = std::tan(14 * std::numbers::pi / 180);
+  const double distance = half / slope + 0.25 * upper_.y();
+  camera_.target = {0, 0.49 * upper_.y(), 0};
+  camera_.eye = camera_.target + distance * Vec3(0.52, 0.10, 0.85).normalized();
 }
 
 render::Camera Shot::camera_at(std::size_t frame) const {

@@ -12,6 +12,7 @@
 #include <sstream>
 #include <string>
 #include <string_view>
+#include <vector>
 
 namespace hooke::io {
 
@@ -48,8 +49,8 @@ class Check {
  public:
   Check(const std::filesystem::path& path, std::string_view text) : path_(path), text_(text) {}
 
-  /// Returns the number of vertices.
-  Index run() {
+  /// Returns the coordinates of all vertices, correctly rounded, which the loader's are not.
+  std::vector<double> run() {
     if (text_.find('\0') != std::string_view::npos) throw Error(path_.string() + ": not an OBJ file: it has bytes of 0");
     std::string_view rest = text_;
     while (!rest.empty()) {
@@ -63,9 +64,9 @@ class Check {
       if (key == "v") vertex(line);
       if (key == "f") face(line);
     }
-    if (vertices_ == 0) throw Error(path_.string() + ": not an OBJ file, or one without vertices (lines \"v x y z\")");
+    if (count() == 0) throw Error(path_.string() + ": not an OBJ file, or one without vertices (lines \"v x y z\")");
     if (faces_ == 0) throw Error(path_.string() + ": has no faces (lines \"f a b c\")");
-    return vertices_;
+    return std::move(coordinates_);
   }
 
  private:
@@ -82,8 +83,8 @@ class Check {
       const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), value);
       if (error != std::errc() || end != word.data() + word.size() || !std::isfinite(value))
         fail("a coordinate must be a finite number, got \"" + std::string(word.substr(0, 40)) + "\"");
+      coordinates_.push_back(value);
     }
-    ++vertices_;
   }
 
   void face(std::string_view line) {
@@ -93,9 +94,9 @@ class Check {
       const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), index);
       if (error != std::errc() || (end != word.data() + word.size() && *end != '/'))
         fail("a corner of a face must be a vertex index, got \"" + std::string(word.substr(0, 40)) + "\"");
-      const Index vertex = index < 0 ? vertices_ + index + 1 : index;
-      if (vertex < 1 || vertex > vertices_)
-        fail("vertex index " + std::to_string(index) + " is not one of the " + std::to_string(vertices_) +
+      const Index vertex = index < 0 ? count() + index + 1 : index;
+      if (vertex < 1 || vertex > count())
+        fail("vertex index " + std::to_string(index) + " is not one of the " + std::to_string(count()) +
              " vertices before it");
     }
     if (corners < 3)
@@ -103,16 +104,20 @@ class Check {
     ++faces_;
   }
 
+  Index count() const { return Index(coordinates_.size() / 3); }
+
   const std::filesystem::path& path_;
   std::string_view text_;
-  Index line_ = 0, vertices_ = 0, faces_ = 0;
+  std::vector<double> coordinates_;
+  Index line_ = 0, faces_ = 0;
 };
 
 }  // namespace
 
 TriangleMesh read_obj(const std::filesystem::path& path) {
   const std::string text = read_text(path);
-  const Index count = Check(path, text).run();
+  const std::vector<double> coordinates = Check(path, text).run();
+  const Index count = Index(coordinates.size() / 3);
 
   tinyobj::attrib_t attributes;
   std::vector<tinyobj::shape_t> shapes;
@@ -128,7 +133,7 @@ TriangleMesh read_obj(const std::filesystem::path& path) {
   TriangleMesh mesh;
   mesh.vertices.resize(count, 3);
   for (Index i = 0; i < count; ++i)
-    for (int k = 0; k < 3; ++k) mesh.vertices(i, k) = attributes.vertices[std::size_t(3 * i + k)];
+    for (int k = 0; k < 3; ++k) mesh.vertices(i, k) = coordinates[std::size_t(3 * i + k)];
   for (const tinyobj::shape_t& shape : shapes)
     for (std::size_t i = 0; i + 2 < shape.mesh.indices.size(); i += 3) {
       Triangle triangle{};

@@ -1,0 +1,216 @@
+// The hooke command as its users meet it: exit codes, messages and files.
+#include <io/temporary_folder.hpp>
+
+#include <gmock/gmock.h>
+
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <csignal>
+#include <cstdio>
+#include <sstream>
+#include <thread>
+
+namespace hooke {
+namespace {
+
+using std::filesystem::exists;
+using test::contents;
+using test::TemporaryFolder;
+using ::testing::HasSubstr;
+
+class Command : public ::testing::Test {
+ protected:
+  struct Result {
+    int code = -1;
+    std::string out, err;
+  };
+  Result run(const std::string& arguments) {
+    const std::string line = std::string(HOOKE_COMMAND) + " " + arguments + " >" + (folder_ / "out.txt").string() + " 2>" +
+                             (folder_ / "err.txt").string();
+    const int status = std::system(line.c_str());
+    return {WIFEXITED(status) ? WEXITSTATUS(status) : -1, contents(folder_ / "out.txt"), contents(folder_ / "err.txt")};
+  }
+  std::string scene(const std::string& keys) { return folder_.write("scene.json", R"({"hooke": 1, )" + keys + "}").string(); }
+  std::string out() const { return (folder_ / "run").string(); }
+
+  TemporaryFolder folder_;
+};
+
+const std::string kPendulum = R"("duration": 0.1, "bodies": [{"type": "soft", "name": "a, b", "points": [[0,0,0],[1,0,0]],
+    "mass": 2, "springs": [{"points": [0,1], "stiffness": 500}], "pins": [0]}])";
+
+std::vector<std::string> lines_of(const std::string& text) {
+  std::vector<std::string> out;
+  std::istringstream stream(text);
+  for (std::string line; std::getline(stream, line);) out.push_back(line);
+  return out;
+}
+
+TEST_F(Command, SimulatesAndWritesStateDiagnosticsAndTimings) {
+  const Result result = run("simulate " + scene(kPendulum) + " --out " + out());
+  EXPECT_EQ(result.code, 0) << result.err;
+  EXPECT_THAT(result.out, HasSubstr("velocity-verlet, float"));
+  const auto state = lines_of(contents(folder_ / "run/state.csv"));
+  ASSERT_EQ(state.size(), 3u);
+  EXPECT_EQ(state[0], "body,index,x,y,z,vx,vy,vz");
+  EXPECT_EQ(state[1], "\"a, b\",0,0,0,0,0,0,0");
+  EXPECT_THAT(state[2], ::testing::StartsWith("\"a, b\",1,"));
+  EXPECT_EQ(lines_of(contents(folder_ / "run/diagnostics.csv")).size(), 1u + 7u);
+  EXPECT_EQ(lines_of(contents(folder_ / "run/timings.csv")).size(), 1u + 7u);
+  for (const auto& entry : std::filesystem::directory_iterator(out()))
+    EXPECT_EQ(entry.path().string().find(".part."), std::string::npos) << entry.path();
+}
+
+TEST_F(Command, TheSameRunGivesTheSameBytesAtAnyThreadCount) {
+  const std::string scene_file = scene(R"("duration": 0.2, "bodies": [
+    {"type": "soft", "name": "a", "grid": {"size": [1, 1], "points": [9, 9]}, "pin": "top"},
+    {"type": "soft", "name": "b", "grid": {"size": [1, 1], "points": [7, 9]}, "pin": "left", "wind": {"velocity": [1, 0, 3]}}])");
+  EXPECT_EQ(run("simulate " + scene_file + " --out " + out()).code, 0);
+  EXPECT_EQ(run("simulate " + scene_file + " --threads 2 --out " + out() + "2").code, 0);
+  for (const char* file : {"state.csv", "diagnostics.csv"})
+    EXPECT_EQ(contents(folder_ / "run" / file), contents(folder_ / "run2" / file)) << file;
+}
+
+TEST_F(Command, ExportsMovingMeshes) {
+  const std::string keys = R"("duration": 0.1, "bodies": [{"type": "soft", "name": "x/y", "grid": {"size": [1, 1], "points": [3, 3]}}])";
+  for (const std::string format : {"obj", "ply", "pc2"})
+    EXPECT_EQ(run("simulate " + scene(keys) + " --export " + format + " --out " + out()).code, 0) << format;
+  EXPECT_TRUE(exists(folder_ / "run/x_y.0006.obj"));
+  EXPECT_TRUE(exists(folder_ / "run/x_y.0006.ply"));
+  EXPECT_EQ(std::filesystem::file_size(folder_ / "run/x_y.pc2"), 32u + 7 * 9 * 12);
+}
+
+TEST_F(Command, ABlowUpIsExitCodeOneAndKeepsTheLastGoodState) {
+  const Result result = run("simulate " + scene(R"("duration": 20, "tick_rate": 60, "bodies": [
+      {"type": "soft", "name": "stiff", "grid": {"size": [1, 1], "points": [6, 6]}, "pin": "top",
+       "material": {"mass": 0.001, "stiffness": {"structural": 1e6}}, "solver": {"method": "explicit-euler", "dt": 1}}])") +
+                            " --out " + out());
+  EXPECT_EQ(result.code, 1);
+  EXPECT_THAT(result.err, HasSubstr("body \"stiff\""));
+  EXPECT_THAT(result.err, HasSubstr("dt"));
+  const std::string state = contents(folder_ / "run/state.csv");
+  EXPECT_EQ(lines_of(state).size(), 37u);
+  EXPECT_EQ(state.find("nan"), std::string::npos);
+  EXPECT_EQ(state.find("inf"), std::string::npos);
+  EXPECT_TRUE(exists(folder_ / "run/diagnostics.csv"));
+}
+
+TEST_F(Command, BadInputIsExitCodeTwoAndOneLine) {
+  const std::string good = scene(kPendulum);
+  const std::string broken = folder_.write("broken.json", R"({"hooke": 1, "bodies": [{"type": "soft", "points": 7}]})").string();
+  const std::string cut = folder_.write("cut.json", R"({"hooke": 1, "bod)").string();
+  const std::string named = "\"" + folder_.write("line\nbreak.json", "{").string() + "\"";
+  const std::vector<std::pair<std::string, std::string>> cases{
+      {"simulate nothing.json --out " + out(), "nothing.json"},
+      {"simulate " + broken + " --out " + out(), "broken.json: bodies[0].points: must be an array, got 7"},
+      {"validate " + broken, "bodies[0].points"},
+      {"render " + broken + " --out " + out() + ".png", "bodies[0].points"},
+      {"simulate " + cut + " --out " + out(), "cut.json: line 1, column"},
+      {"simulate " + named + " --out " + out(), "break.json"},
+      {"simulate " + folder_.path().string() + " --out " + out(), "no such scene"},
+      {"simulate " + good, "--out"},
+      {"simulate " + good + " --out " + out() + " --resume", "--resume is not available"},
+      {"simulate " + good + " --out " + out() + " --method euler", "velocity-verlet"},
+      {"simulate " + good + " --out " + out() + " --precision half", "float, double"},
+      {"simulate " + good + " --out " + out() + " --dt 0", "--dt must be positive"},
+      {"simulate " + good + " --out " + out() + " --dt nan", "--dt must be positive"},
+      {"simulate " + good + " --out " + out() + " --end -1", "--end must be positive"},
+      {"simulate " + good + " --out " + out() + " --end soon", "--end"},
+      {"simulate " + good + " --out " + out() + " --threads 0", "--threads must be from 1"},
+      {"simulate " + good + " --out " + out() + " --export fbx", "obj, ply, pc2"},
+      {"render " + good + " --out " + out() + ".mp4 --size 641x480", "even"},
+      {"render " + good + " --out " + out() + ".png --size large", "--size must be WIDTHxHEIGHT"},
+      {"render " + good + " --out " + out() + ".png --supersample 9", "--supersample"},
+      {"render " + good + " --out " + out() + ".mp4 --frame-at 1", "--frame-at is for a PNG"},
+      {"dance", "dance"},
+      {"", "a command is needed"},
+  };
+  for (const auto& [arguments, words] : cases) {
+    const Result result = run(arguments);
+    EXPECT_EQ(result.code, 2) << arguments;
+    EXPECT_THAT(result.err, HasSubstr(words)) << arguments;
+    EXPECT_EQ(lines_of(result.err).size(), 1u) << arguments << "\n" << result.err;
+    EXPECT_FALSE(exists(folder_ / "run")) << arguments;
+  }
+}
+
+TEST_F(Command, OutputsThatCannotBeWrittenAreExitCodeThree) {
+  const std::string good = scene(kPendulum);
+  std::filesystem::create_directories(folder_ / "full");
+  for (const std::string out_folder : {std::string("/dev/null/x"), std::string("/proc/hooke/x"), good}) {
+    const Result result = run("simulate " + good + " --out " + out_folder);
+    EXPECT_EQ(result.code, 3) << out_folder;
+    EXPECT_THAT(result.err, HasSubstr(out_folder));
+  }
+  if (!exists("/dev/full")) return;
+  for (const char* file : {"state.part.csv", "diagnostics.part.csv", "timings.part.csv", "a__b.0000.part.obj"}) {
+    const TemporaryFolder full;
+    std::filesystem::create_symlink("/dev/full", full / file);
+    const Result result = run("simulate " + good + " --export obj --out " + full.path().string());
+    EXPECT_EQ(result.code, 3) << file;
+    EXPECT_THAT(result.err, HasSubstr("No space left on device")) << file;
+  }
+  EXPECT_EQ(run("render " + good + " --out /dev/null/x/a.png --size 64x64").code, 3);
+}
+
+TEST_F(Command, ATerminatedRunKeepsItsFinishedFrames) {
+  const std::string file = scene(R"("duration": 1000, "bodies": [{"type": "soft", "grid": {"size": [1, 1], "points": [9, 9]}, "pin": "top"}])");
+  const pid_t child = fork();
+  if (child == 0) {
+    std::freopen((folder_ / "log.txt").c_str(), "w", stdout);
+    std::freopen((folder_ / "log.txt").c_str(), "w", stderr);
+    execl(HOOKE_COMMAND, HOOKE_COMMAND, "simulate", file.c_str(), "--out", out().c_str(), "--export", "pc2", nullptr);
+    _exit(99);
+  }
+  for (int i = 0; i < 1000 && !exists(folder_ / "run/body0.part.pc2"); ++i) std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  std::this_thread::sleep_for(std::chrono::milliseconds(200));
+  kill(child, SIGTERM);
+  int status = 0;
+  waitpid(child, &status, 0);
+  ASSERT_TRUE(WIFEXITED(status));
+  EXPECT_EQ(WEXITSTATUS(status), 130);
+  const std::size_t frames = lines_of(contents(folder_ / "run/diagnostics.csv")).size() - 1;
+  EXPECT_GT(frames, 1u);
+  EXPECT_EQ(std::filesystem::file_size(folder_ / "run/body0.pc2"), 32 + frames * 81 * 12);
+  EXPECT_EQ(lines_of(contents(folder_ / "run/state.csv")).size(), 82u);
+}
+
+TEST_F(Command, ValidatesWithTheLargestStableStepOfEveryMethod) {
+  const Result result = run("validate hanging-sheet-32");
+  EXPECT_EQ(result.code, 0);
+  for (const char* words : {"1024 points (32 held), 5826 springs", "implicit-euler         any", "rk4 ", "valid", "0.3 kg"})
+    EXPECT_THAT(result.out, HasSubstr(words));
+}
+
+TEST_F(Command, WarnsOfAStepThatIsNotStable) {
+  const Result result = run("validate " + scene(R"("bodies": [{"type": "soft", "grid": {"size": [1, 1], "points": [9, 9]},
+      "solver": {"dt": 0.004}}])"));
+  EXPECT_EQ(result.code, 0);
+  EXPECT_THAT(result.out, HasSubstr("warning: the step is above the largest stable one"));
+}
+
+TEST_F(Command, ListsScenesAndHelps) {
+  for (const char* list : {"list", "--list"}) {
+    const Result result = run(list);
+    EXPECT_EQ(result.code, 0);
+    EXPECT_THAT(result.out, HasSubstr("hanging-sheet-64"));
+    EXPECT_THAT(result.out, HasSubstr("cape"));
+  }
+  for (const char* help : {"--help", "simulate --help", "render --help", "validate --help"}) {
+    const Result result = run(help);
+    EXPECT_EQ(result.code, 0);
+    EXPECT_THAT(result.out, HasSubstr("Example"));
+  }
+}
+
+TEST_F(Command, RendersAPictureAndAFolderOfPictures) {
+  EXPECT_EQ(run("render " + scene(kPendulum) + " --out " + out() + ".png --size 160x90 --frame-at 0.05").code, 0);
+  EXPECT_EQ(contents(out() + ".png").substr(1, 3), "PNG");
+  EXPECT_EQ(run("render " + scene(kPendulum) + " --out " + out() + " --size 160x90").code, 0);
+  EXPECT_TRUE(exists(folder_ / "run/frame.0005.png"));
+  EXPECT_FALSE(exists(folder_ / "run/frame.0006.png")) << "0.1 s at 60 Hz are six pictures";
+}
+
+}  // namespace
+}  // namespace hooke
