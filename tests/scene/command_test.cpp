@@ -74,8 +74,8 @@ TEST_F(Command, TheSameRunGivesTheSameBytesAtAnyThreadCount) {
 
 TEST_F(Command, ExportsMovingMeshes) {
   const std::string keys = R"("duration": 0.1, "bodies": [{"type": "soft", "name": "x/y", "grid": {"size": [1, 1], "points": [3, 3]}}])";
-  for (const std::string format : {"obj", "ply", "pc2"})
-    EXPECT_EQ(run("simulate " + scene(keys) + " --export " + format + " --out " + out()).code, 0) << format;
+  for (const char* format : {"obj", "ply", "pc2"})
+    EXPECT_EQ(run("simulate " + scene(keys) + " --export " + std::string(format) + " --out " + out()).code, 0) << format;
   EXPECT_TRUE(exists(folder_ / "run/x_y.0006.obj"));
   EXPECT_TRUE(exists(folder_ / "run/x_y.0006.ply"));
   EXPECT_EQ(std::filesystem::file_size(folder_ / "run/x_y.pc2"), 32u + 7 * 9 * 12);
@@ -138,7 +138,7 @@ TEST_F(Command, BadInputIsExitCodeTwoAndOneLine) {
 TEST_F(Command, OutputsThatCannotBeWrittenAreExitCodeThree) {
   const std::string good = scene(kPendulum);
   std::filesystem::create_directories(folder_ / "full");
-  for (const std::string out_folder : {std::string("/dev/null/x"), std::string("/proc/hooke/x"), good}) {
+  for (const std::string& out_folder : {std::string("/dev/null/x"), std::string("/proc/hooke/x"), good}) {
     const Result result = run("simulate " + good + " --out " + out_folder);
     EXPECT_EQ(result.code, 3) << out_folder;
     EXPECT_THAT(result.err, HasSubstr(out_folder));
