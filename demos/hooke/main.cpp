@@ -47,7 +47,8 @@ void check(const CLI::App& command, const RunOptions& run) {
 
 void read_size(const std::string& text, RenderOptions& options) {
   int used = 0;
-  if (std::sscanf(text.c_str(), "%dx%d%n", &options.width, &options.height, &used) != 2 || std::size_t(used) != text.size())
+  if (std::sscanf(text.c_str(), "%dx%d%n", &options.width, &options.height, &used) != 2 ||
+      std::size_t(used) != text.size())
     throw Error("--size must be WIDTHxHEIGHT in pixels, e.g. 1920x1080, got " + text);
   if (options.width < 16 || options.height < 16 || options.width > 8192 || options.height > 8192)
     throw Error("--size must be from 16x16 to 8192x8192, got " + text);
@@ -55,25 +56,29 @@ void read_size(const std::string& text, RenderOptions& options) {
 
 int dispatch(int argc, char** argv) {
   Arguments a;
-  CLI::App app("Simulates and draws soft bodies.\nExit codes: 0 done, 1 diverged, 2 bad input, 3 output not writable, "
-               "130 interrupted.",
-               "hooke");
+  CLI::App app(
+      "Simulates and draws soft bodies.\nExit codes: 0 done, 1 diverged, 2 bad input, 3 output not writable, "
+      "130 interrupted.",
+      "hooke");
   app.add_flag("--list", a.list, "The scenes that have a name");
   app.footer("Example: hooke render cape --out cape.mp4");
 
   CLI::App* simulate_command = app.add_subcommand("simulate", "Simulate a scene and write its end and its diagnostics");
   add_run_options(*simulate_command, a.simulate.run);
-  simulate_command->add_option("--out", a.simulate.out, "Folder for state.csv, diagnostics.csv and timings.csv")->required();
+  simulate_command->add_option("--out", a.simulate.out, "Folder for state.csv, diagnostics.csv and timings.csv")
+      ->required();
   simulate_command->add_option("--export", a.simulate.export_format, "Moving meshes as well: obj, ply or pc2");
   simulate_command->add_flag("--resume", a.resume, "Not available: there are no checkpoints yet");
-  simulate_command->footer("Example: hooke simulate hanging-sheet-32 --method velocity-verlet --precision double --out sheet");
+  simulate_command->footer(
+      "Example: hooke simulate hanging-sheet-32 --method velocity-verlet --precision double --out sheet");
 
   CLI::App* render_command = app.add_subcommand("render", "Simulate a scene and draw it as a film or a picture");
   add_run_options(*render_command, a.render.run);
   render_command->add_option("--out", a.render.out, "FILE.mp4, FILE.png or a folder for one PNG a frame")->required();
   render_command->add_option("--size", a.size, "WIDTHxHEIGHT [pixels], 1280x720 if not given");
   render_command->add_option("--frame-at", a.render.frame_at, "Moment of a PNG [s]");
-  render_command->add_option("--supersample", a.render.supersample, "1 to 4: draws that many times larger and averages");
+  render_command->add_option("--supersample", a.render.supersample,
+                             "1 to 4: draws that many times larger and averages");
   render_command->footer("Example: hooke render flag --out flag.png --frame-at 2.5 --size 1920x1080 --supersample 2");
 
   CLI::App* validate_command = app.add_subcommand("validate", "Check a scene; largest stable step of every method");

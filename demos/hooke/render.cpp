@@ -66,7 +66,8 @@ int render(const RenderOptions& options) {
   double end = d.duration;
   if (still) {
     const double moment = options.frame_at.value_or(d.poster >= 0 ? std::min(d.poster, end) : end / 2);
-    if (!(moment >= 0 && moment <= 1e6)) throw Error("--frame-at must be from 0 to 1e6 s, got " + std::to_string(moment));
+    if (!(moment >= 0 && moment <= 1e6))
+      throw Error("--frame-at must be from 0 to 1e6 s, got " + std::to_string(moment));
     end = moment;
   }
   Sink sink(options, d.frame_rate);

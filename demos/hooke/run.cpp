@@ -82,7 +82,8 @@ bool interrupted() { return caught != 0; }
 double wall_seconds() { return seconds_of(CLOCK_MONOTONIC); }
 double cpu_seconds() { return seconds_of(CLOCK_PROCESS_CPUTIME_ID); }
 
-Progress::Progress(std::string what) : what_(std::move(what)), terminal_(isatty(STDERR_FILENO) != 0), begin_(wall_seconds()) {}
+Progress::Progress(std::string what)
+    : what_(std::move(what)), terminal_(isatty(STDERR_FILENO) != 0), begin_(wall_seconds()) {}
 
 void Progress::show(double share) {
   const double now = wall_seconds();
@@ -159,10 +160,11 @@ std::string chosen(const scene::Scene& scene) {
     const scene::MotionFacts facts = scene::motion_facts(*body.body);
     out += body.body->name() + ": " + std::to_string(body.body->size()) + " points, " +
            std::to_string(body.network->springs.size()) + " springs; " + facts.method + ", " + facts.precision + ", ";
-    out += format("%ld substep%s of %.4g ms a tick of %.4g ms%s\n", long(facts.substeps), facts.substeps == 1 ? "" : "s",
-                  1e3 * tick / double(std::max<Index>(facts.substeps, 1)), 1e3 * tick,
+    out += format("%ld substep%s of %.4g ms a tick of %.4g ms%s\n", long(facts.substeps),
+                  facts.substeps == 1 ? "" : "s", 1e3 * tick / double(std::max<Index>(facts.substeps, 1)), 1e3 * tick,
                   facts.wanted_dt > 0 ? " (dt given)" : " (automatic)");
-    if (facts.wanted_dt > 0 && facts.stable_step > 0 && tick / double(std::max<Index>(facts.substeps, 1)) > facts.stable_step)
+    if (facts.wanted_dt > 0 && facts.stable_step > 0 &&
+        tick / double(std::max<Index>(facts.substeps, 1)) > facts.stable_step)
       out += format("%s: warning: the step is above the largest stable one, %.4g ms\n", body.body->name().c_str(),
                     1e3 * facts.stable_step);
   }

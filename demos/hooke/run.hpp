@@ -52,11 +52,11 @@ double cpu_seconds();
 struct RunResult {
   StepReport report;
   bool interrupted = false;
-  std::int64_t frames = 0;              ///< finished, the one at time 0 included
+  std::int64_t frames = 0;  ///< finished, the one at time 0 included
   std::int64_t wanted_frames = 0;
-  double shown_time = 0;                ///< [s]
-  double wall = 0, cpu = 0;             ///< of the simulation alone [s], preroll included
-  double simulated = 0;                 ///< [s], preroll included
+  double shown_time = 0;     ///< [s]
+  double wall = 0, cpu = 0;  ///< of the simulation alone [s], preroll included
+  double simulated = 0;      ///< [s], preroll included
   std::vector<scene::CapeFigures> capes;
 
   /// kDone, kDiverged or kInterrupted.

@@ -202,7 +202,8 @@ std::vector<std::string> Shot::caption(std::size_t frame) const {
   if (!scene_.bodies.empty()) {
     const scene::MotionFacts facts = scene::motion_facts(*scene_.bodies[0].body);
     std::snprintf(text, sizeof text, "%ld points, %s, %s, step %.3g ms", long(points), facts.method.c_str(),
-                  facts.precision.c_str(), 1e3 * scene_.world.clock().tick() / double(std::max<Index>(1, facts.substeps)));
+                  facts.precision.c_str(),
+                  1e3 * scene_.world.clock().tick() / double(std::max<Index>(1, facts.substeps)));
     lines.emplace_back(text);
   }
   std::snprintf(text, sizeof text, "%.3g ms a frame, worst stretch %.1f %%", mean_ms_,

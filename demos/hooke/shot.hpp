@@ -12,7 +12,7 @@ namespace hooke::command {
 
 /// What is kept of a frame until it is drawn.
 struct Snapshot {
-  double time = 0;                    ///< shown [s]
+  double time = 0;  ///< shown [s]
   double simulate_ms = 0;
   double worst_stretch = 0;
   std::vector<Points<float>> points;  ///< one a body [m]

@@ -44,8 +44,8 @@ class Outputs {
       return ms;
     };
     const Energy energy = scene.world.energy();
-    const io::Diagnostics diagnostics{scene.shown_time(),      energy.kinetic,         energy.gravitational,
-                                      energy.elastic,          scene.world.momentum(), scene::worst_stretch(scene)};
+    const io::Diagnostics diagnostics{scene.shown_time(), energy.kinetic,         energy.gravitational,
+                                      energy.elastic,     scene.world.momentum(), scene::worst_stretch(scene)};
     timings.measure = lap();
     diagnostics_.add(diagnostics);
     for (std::size_t i = 0; i < caches_.size(); ++i) caches_[i]->add(scene.bodies[i].body->positions());
@@ -90,7 +90,9 @@ int simulate(const SimulateOptions& options) {
   outputs.finish(scene);
   std::printf("%s", summary(result).c_str());
   if (!result.report.good()) std::fprintf(stderr, "hooke: %s\n", result.report.text().c_str());
-  if (result.interrupted) std::fprintf(stderr, "hooke: interrupted at %.6g s; what is finished is in %s\n", result.shown_time, options.out.c_str());
+  if (result.interrupted)
+    std::fprintf(stderr, "hooke: interrupted at %.6g s; what is finished is in %s\n", result.shown_time,
+                 options.out.c_str());
   return result.exit_code();
 }
 

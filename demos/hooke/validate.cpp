@@ -18,8 +18,8 @@ void print_body(const scene::SceneBody& body) {
   Index held = 0;
   for (const bool is_held : body.held) held += is_held;
   std::printf("%s: %ld points (%ld held), %zu springs, %zu triangles, %.6g kg, %.4g x %.4g x %.4g m\n",
-              body.body->name().c_str(), long(x.rows()), long(held), body.network->springs.size(), body.triangles.size(),
-              body.body->total_mass(), extent.x(), extent.y(), extent.z());
+              body.body->name().c_str(), long(x.rows()), long(held), body.network->springs.size(),
+              body.triangles.size(), body.body->total_mass(), extent.x(), extent.y(), extent.z());
 }
 
 // "0.53 ms", "none", "any" or why the method cannot be used.

@@ -173,8 +173,10 @@ class Builder {
                   "; the recorded walk is in the Debian package assimp-testmodels (apt-get install assimp-testmodels)");
     const double needed = settings.hold + settings.blend_in;
     if (d_.preroll < needed - 1e-9)
-      throw Error("the human stands still and begins to walk before the first frame: preroll must be at least hold + "
-                  "blend_in = " + std::to_string(needed) + " s, got " + std::to_string(d_.preroll) + " s");
+      throw Error(
+          "the human stands still and begins to walk before the first frame: preroll must be at least hold + "
+          "blend_in = " +
+          std::to_string(needed) + " s, got " + std::to_string(d_.preroll) + " s");
     const std::size_t number = scene_.humans.size();
     const human::Human human =
         reuse_ && number < reuse_->humans.size() ? reuse_->humans[number].human : human::Human(settings);
@@ -202,13 +204,14 @@ class Builder {
       settings.network = std::make_shared<const softbody::SpringNetwork>(raw->network);
       settings.pins = raw->pins;
     } else if (const auto* grid = std::get_if<Grid>(&description.form)) {
-      settings = told_at(d_, description.path, [&] { return softbody::settings_of(cloth_of(*grid, description.material)); });
+      settings =
+          told_at(d_, description.path, [&] { return softbody::settings_of(cloth_of(*grid, description.material)); });
       lattice = {grid->columns, grid->rows};
       lay_out_uv(lattice, grid->width, grid->height, out);
     } else if (const auto* mesh = std::get_if<MeshFile>(&description.form)) {
       settings = told_at(d_, description.path + ".mesh", [&] {
-        return softbody::settings_of(
-            softbody::cloth_from_mesh(io::read_obj(mesh->file), std::get<softbody::ClothMaterial>(description.material)));
+        return softbody::settings_of(softbody::cloth_from_mesh(
+            io::read_obj(mesh->file), std::get<softbody::ClothMaterial>(description.material)));
       });
     } else {
       const auto& cut = std::get<CapeCut>(description.form);
@@ -230,9 +233,8 @@ class Builder {
 
     std::unique_ptr<Body> body = told_at(d_, description.path, [&] {
       std::unique_ptr<Body> made = softbody::make_soft_body(settings);
-      if (description.wind &&
-          !(add_wind<float>(*made, *description.wind, settings.triangles, d_.preroll) ||
-            add_wind<double>(*made, *description.wind, settings.triangles, d_.preroll)))
+      if (description.wind && !(add_wind<float>(*made, *description.wind, settings.triangles, d_.preroll) ||
+                                add_wind<double>(*made, *description.wind, settings.triangles, d_.preroll)))
         throw Error("this body takes no wind");
       return made;
     });
@@ -324,7 +326,8 @@ bool facts(const Body& body, const char* precision, MotionFacts& out) {
 
 Scene build(const SceneDescription& description, const Scene* reuse) { return Builder(description, reuse).run(); }
 
-void override_solver(SceneDescription& description, const std::string& method, double dt, const std::string& precision) {
+void override_solver(SceneDescription& description, const std::string& method, double dt,
+                     const std::string& precision) {
   if (!method.empty()) method_named(method);
   if (!precision.empty() && precision != "float" && precision != "double")
     throw Error("there is no precision \"" + precision + "\"; there are float, double");

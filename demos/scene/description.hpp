@@ -15,8 +15,8 @@ namespace hooke::scene {
 
 /// Where something driven is, relative to its start, in shown time. Before time 0 it stands still.
 struct Key {
-  double time = 0;         ///< [s]
-  Vec3 offset{0, 0, 0};    ///< [m]
+  double time = 0;       ///< [s]
+  Vec3 offset{0, 0, 0};  ///< [m]
 };
 struct Drive {
   Vec3 translate{0, 0, 0};  ///< [m/s]
@@ -51,16 +51,16 @@ struct MeshFile {
   std::filesystem::path file;
 };
 struct CapeCut {
-  std::string human;             ///< name of a human collider
+  std::string human;  ///< name of a human collider
   double width = 0.9, height = 1.2;
   int columns = 60, rows = 80;
 };
 
 /// Springs with fixed constants on a grid of equal masses: the classical mass-spring sheet.
 struct FixedMaterial {
-  double mass = 1;                               ///< total [kg]
-  double structural = 0, shear = 0, bend = 0;    ///< "stiffness" of each spring [N/m]
-  double damping = 0;                            ///< of each spring [N·s/m]
+  double mass = 1;                             ///< total [kg]
+  double structural = 0, shear = 0, bend = 0;  ///< "stiffness" of each spring [N/m]
+  double damping = 0;                          ///< of each spring [N·s/m]
 };
 using Material = std::variant<softbody::ClothMaterial, FixedMaterial>;
 

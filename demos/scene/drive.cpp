@@ -12,7 +12,8 @@ namespace {
 Vec3 along_keys(const std::vector<Key>& keys, double t) {
   if (t <= keys.front().time) return keys.front().offset;
   if (t >= keys.back().time) return keys.back().offset;
-  const auto after = std::upper_bound(keys.begin(), keys.end(), t, [](double at, const Key& key) { return at < key.time; });
+  const auto after =
+      std::upper_bound(keys.begin(), keys.end(), t, [](double at, const Key& key) { return at < key.time; });
   const auto slope = [&](std::vector<Key>::const_iterator key) -> Vec3 {
     if (key == keys.begin() || key + 1 == keys.end()) return Vec3::Zero();
     return ((key + 1)->offset - (key - 1)->offset) / ((key + 1)->time - (key - 1)->time);

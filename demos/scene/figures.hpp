@@ -33,7 +33,7 @@ class CapeFigures {
   double bare_depth() const { return bare_depth_; }
   double pin_error() const { return pin_error_; }  ///< greatest distance of a pin from where it should be [m]
   double worst_stretch() const;
-  double stretch_percentile(double share) const;   ///< of all structural springs in all frames
+  double stretch_percentile(double share) const;  ///< of all structural springs in all frames
   /// (time [s], RMS speed of the free points [m/s]) each half second from the wearer's last step on.
   const std::vector<std::pair<double, double>>& settling() const { return settling_; }
 

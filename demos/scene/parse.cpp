@@ -51,8 +51,8 @@ std::vector<PointChoice> read_choices(const Value& value) {
   std::vector<PointChoice> out;
   const auto one = [&](const Value& choice) {
     if (choice.json().is_string())
-      out.emplace_back(choice.choice({"top", "bottom", "left", "right", "top-left", "top-right", "bottom-left",
-                                      "bottom-right"}));
+      out.emplace_back(
+          choice.choice({"top", "bottom", "left", "right", "top-left", "top-right", "bottom-left", "bottom-right"}));
     else if (choice.json().is_number_integer())
       out.emplace_back(choice.whole(0, kMostPoints - 1));
     else
@@ -243,8 +243,10 @@ SoftBody read_soft(const Value& value, std::size_t number, const std::filesystem
 
   for (const char* key : {"velocities", "masses", "mass", "springs", "pins"})
     if (!raw && object.has(key))
-      object[key].fail(std::string("belongs to raw points") + (std::string(key) == "pins" ? "; grids and meshes have \"pin\"" : ""));
-  if (raw && object.has("material")) object["material"].fail("belongs to grids, meshes and capes; raw points have springs");
+      object[key].fail(std::string("belongs to raw points") +
+                       (std::string(key) == "pins" ? "; grids and meshes have \"pin\"" : ""));
+  if (raw && object.has("material"))
+    object["material"].fail("belongs to grids, meshes and capes; raw points have springs");
   if (raw && object.has("pin")) object["pin"].fail("belongs to grids and meshes; raw points have \"pins\"");
   if (raw && object.has("wind")) object["wind"].fail("needs triangles: a grid, a mesh or a cape");
   if (cape && object.has("origin")) object["origin"].fail("a cape begins on its human's shoulders");
@@ -275,7 +277,8 @@ SoftBody read_body(const Value& value, std::size_t number, const std::filesystem
   if (type == value.json().end()) value.fail("the key \"type\" is missing");
   const Value type_value(*type, value.file(), value.path() + ".type");
   const std::string kind = type_value.choice({"soft", "particles", "rigid"});
-  if (kind != "soft") type_value.fail("bodies of type \"" + kind + "\" are not available in scene files yet; use \"soft\"");
+  if (kind != "soft")
+    type_value.fail("bodies of type \"" + kind + "\" are not available in scene files yet; use \"soft\"");
   return read_soft(value, number, folder);
 }
 

@@ -12,7 +12,8 @@ namespace hooke::scene {
 /// @param file what messages call the text
 /// @throws hooke::Error "FILE: PATH: RULE, got VALUE", one line, e.g.
 ///         "cape.json: bodies[0].springs[3].points[1]: must be below the point count 4, got 9"
-SceneDescription parse_scene(const std::string& text, const std::string& file, const std::filesystem::path& folder = ".");
+SceneDescription parse_scene(const std::string& text, const std::string& file,
+                             const std::filesystem::path& folder = ".");
 
 /// Reads and parses a scene file.
 SceneDescription read_scene(const std::filesystem::path& path);

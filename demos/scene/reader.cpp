@@ -48,7 +48,9 @@ class Follower {
         levels_.pop_back();
         count();
         break;
-      case Event::value: count(); break;
+      case Event::value:
+        count();
+        break;
       case Event::key: {
         Level& level = levels_.back();
         level.key = parsed.get<std::string>();
@@ -106,9 +108,9 @@ const KeyTable& key_table() {
       {"scene",
        {"hooke", "title", "gravity", "damping", "duration", "frame_rate", "tick_rate", "preroll", "poster", "bodies",
         "colliders", "camera"}},
-      {"soft",
-       {"type", "name", "origin", "points", "velocities", "masses", "mass", "springs", "pins", "grid", "mesh", "cape",
-        "material", "pin", "pin_motion", "wind", "drag", "thickness", "color", "inside_color", "solver"}},
+      {"soft", {"type",       "name", "origin", "points",    "velocities", "masses",       "mass",
+                "springs",    "pins", "grid",   "mesh",      "cape",       "material",     "pin",
+                "pin_motion", "wind", "drag",   "thickness", "color",      "inside_color", "solver"}},
       {"spring", {"points", "stiffness", "damping", "rest_length"}},
       {"grid", {"size", "points", "right", "down"}},
       {"cape", {"human", "size", "points"}},
@@ -120,8 +122,7 @@ const KeyTable& key_table() {
       {"motion", {"translate", "swing", "keys"}},
       {"swing", {"amplitude", "period"}},
       {"key", {"time", "offset"}},
-      {"wind",
-       {"velocity", "gust", "gust_period", "swing", "stop", "fade", "air_density", "drag", "lift", "seed"}},
+      {"wind", {"velocity", "gust", "gust_period", "swing", "stop", "fade", "air_density", "drag", "lift", "seed"}},
       {"drag", {"linear", "quadratic"}},
       {"solver", {"method", "dt", "precision"}},
       {"half_space", {"type", "name", "normal", "offset", "friction", "restitution"}},
@@ -138,7 +139,8 @@ const KeyTable& key_table() {
 Json parse_json(const std::string& text, const std::string& file) {
   Follower follower(file);
   try {
-    return Json::parse(text, [&](int depth, Json::parse_event_t event, Json& parsed) { return follower(depth, event, parsed); });
+    return Json::parse(
+        text, [&](int depth, Json::parse_event_t event, Json& parsed) { return follower(depth, event, parsed); });
   } catch (const Json::parse_error& error) {
     throw Error(file + ": " + plain(error.what()));
   } catch (const Json::exception& error) {
@@ -155,7 +157,8 @@ void Value::fail_got(const std::string& rule) const { fail(rule + ", got " + sho
 
 double Value::number(const Range& range, const char* unit) const {
   const std::string rule = std::string("must be ") + range.words + (*unit ? std::string(" [") + unit + "]" : "");
-  if (!json_->is_number()) fail_got(range.words == Range::any().words ? rule : "must be a number, " + std::string(range.words));
+  if (!json_->is_number())
+    fail_got(range.words == Range::any().words ? rule : "must be a number, " + std::string(range.words));
   const double value = json_->get<double>();
   const bool low = range.least_allowed ? value >= range.least : value > range.least;
   const bool high = range.most_allowed ? value <= range.most : value < range.most;

@@ -42,7 +42,8 @@ struct Range {
 /// A value in the file, with where it stands.
 class Value {
  public:
-  Value(const Json& json, std::string file, std::string path) : json_(&json), file_(std::move(file)), path_(std::move(path)) {}
+  Value(const Json& json, std::string file, std::string path)
+      : json_(&json), file_(std::move(file)), path_(std::move(path)) {}
 
   const std::string& path() const { return path_; }
   const std::string& file() const { return file_; }
@@ -55,10 +56,10 @@ class Value {
 
   double number(const Range& range = Range::any(), const char* unit = "") const;
   Index whole(Index least, Index most) const;
-  std::string text() const;      ///< not empty, no control characters
-  bool truth() const;            ///< true or false
-  Vec3 vec3() const;             ///< [x, y, z]
-  std::size_t array() const;     ///< its length; fails for anything else
+  std::string text() const;   ///< not empty, no control characters
+  bool truth() const;         ///< true or false
+  Vec3 vec3() const;          ///< [x, y, z]
+  std::size_t array() const;  ///< its length; fails for anything else
   Value at(std::size_t i) const;
   /// One of these words.
   std::string choice(const std::vector<std::string>& allowed) const;

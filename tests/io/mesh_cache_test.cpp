@@ -41,7 +41,8 @@ void expect_point_cache(const std::string& bytes, std::uint32_t samples) {
   for (std::uint32_t s = 0; s < samples; ++s)
     for (Index i = 0; i < 4; ++i)
       for (int k = 0; k < 3; ++k)
-        EXPECT_EQ(float_at(bytes, 32 + s * 48 + std::size_t(i) * 12 + std::size_t(k) * 4), float(sample(0.1 * s)(i, k)));
+        EXPECT_EQ(float_at(bytes, 32 + s * 48 + std::size_t(i) * 12 + std::size_t(k) * 4),
+                  float(sample(0.1 * s)(i, k)));
 }
 
 TEST(PointCache, HeaderAndSamplesAreWhatThePlayerExpects) {

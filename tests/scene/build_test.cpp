@@ -51,12 +51,16 @@ TEST(HangingSheet, IsTheStandardSheet) {
     double worst = 0;
     for (int r = 0; r < n; ++r)
       for (int c = 0; c < n; ++c)
-        worst = std::max(worst, (Vec3(c * h - 0.5, -r * h * tilt, r * h * tilt).transpose().array() - x.row(r * n + c)).abs().maxCoeff());
+        worst = std::max(
+            worst,
+            (Vec3(c * h - 0.5, -r * h * tilt, r * h * tilt).transpose().array() - x.row(r * n + c)).abs().maxCoeff());
     EXPECT_LT(worst, 5e-16);
     EXPECT_TRUE((sheet.body->masses() == 0.3 / (n * n)).all());
     for (Index i = 0; i < x.rows(); ++i) ASSERT_EQ(sheet.body->pinned(i), i < n);
     for (const softbody::Spring& spring : sheet.network->springs) {
-      const double k = spring.family == softbody::Family::Stretch ? 500 : spring.family == softbody::Family::Shear ? 100 : 5;
+      const double k = spring.family == softbody::Family::Stretch ? 500
+                       : spring.family == softbody::Family::Shear ? 100
+                                                                  : 5;
       ASSERT_EQ(spring.stiffness, k);
       ASSERT_EQ(spring.damping, 0);
     }
@@ -77,7 +81,8 @@ TEST(Grid, MovesBitwiseLikeTheSamePointsWrittenOut) {
 
 TEST(Grid, EdgesAndCornersHaveTheirNames) {
   const auto pinned = [](const std::string& pin) {
-    const Scene scene = scene_of(R"("bodies": [{"type": "soft", "grid": {"size": [1, 1], "points": [3, 4]}, "pin": )" + pin + "}]");
+    const Scene scene =
+        scene_of(R"("bodies": [{"type": "soft", "grid": {"size": [1, 1], "points": [3, 4]}, "pin": )" + pin + "}]");
     std::vector<int> out;
     for (int i = 0; i < 12; ++i)
       if (scene.bodies[0].body->pinned(i)) out.push_back(i);
@@ -94,7 +99,8 @@ TEST(Grid, EdgesAndCornersHaveTheirNames) {
 
 TEST(Defaults, AreThoseOfTheManual) {
   const SceneDescription scene = parse_scene(R"({"hooke": 1, "bodies": [
-      {"type": "soft", "points": [[0,0,0],[1,0,0]], "mass": 2, "springs": [{"points": [0,1], "stiffness": 5}]}]})", "s");
+      {"type": "soft", "points": [[0,0,0],[1,0,0]], "mass": 2, "springs": [{"points": [0,1], "stiffness": 5}]}]})",
+                                             "s");
   EXPECT_EQ(scene.gravity, Vec3(0, -9.81, 0));
   EXPECT_EQ(scene.frame_rate, 60);
   EXPECT_EQ(scene.tick_rate, 240);
@@ -168,7 +174,8 @@ TEST(Keys, AreMetExactlyAndJoinedWithoutJumps) {
   const double h = 1e-6;
   for (double t = -0.5; t < 3.5; t += 0.01) {
     EXPECT_LT((drive.offset(t + h) - drive.offset(t)).norm(), 3 * h);
-    const Vec3 before = (drive.offset(t) - drive.offset(t - h)) / h, after = (drive.offset(t + h) - drive.offset(t)) / h;
+    const Vec3 before = (drive.offset(t) - drive.offset(t - h)) / h,
+               after = (drive.offset(t + h) - drive.offset(t)) / h;
     EXPECT_LT((after - before).norm(), 1e-3);
   }
   EXPECT_EQ(drive.offset(-1), Vec3(0, 0, 0));
@@ -176,7 +183,8 @@ TEST(Keys, AreMetExactlyAndJoinedWithoutJumps) {
 }
 
 TEST(Stretch, IsThatOfTheWorstFreeSpring) {
-  Scene scene = scene_of(R"("bodies": [{"type": "soft", "points": [[0,0,0],[1.25,0,0],[0,9,0]], "mass": 1, "pins": [0, 2],
+  Scene scene =
+      scene_of(R"("bodies": [{"type": "soft", "points": [[0,0,0],[1.25,0,0],[0,9,0]], "mass": 1, "pins": [0, 2],
       "springs": [{"points": [0,1], "stiffness": 5, "rest_length": 1}, {"points": [0,2], "stiffness": 5, "rest_length": 1}]}])");
   EXPECT_DOUBLE_EQ(worst_stretch(scene), 0.25);
 }

@@ -26,18 +26,21 @@ class Command : public ::testing::Test {
     std::string out, err;
   };
   Result run(const std::string& arguments) {
-    const std::string line = std::string(HOOKE_COMMAND) + " " + arguments + " >" + (folder_ / "out.txt").string() + " 2>" +
-                             (folder_ / "err.txt").string();
+    const std::string line = std::string(HOOKE_COMMAND) + " " + arguments + " >" + (folder_ / "out.txt").string() +
+                             " 2>" + (folder_ / "err.txt").string();
     const int status = std::system(line.c_str());
     return {WIFEXITED(status) ? WEXITSTATUS(status) : -1, contents(folder_ / "out.txt"), contents(folder_ / "err.txt")};
   }
-  std::string scene(const std::string& keys) { return folder_.write("scene.json", R"({"hooke": 1, )" + keys + "}").string(); }
+  std::string scene(const std::string& keys) {
+    return folder_.write("scene.json", R"({"hooke": 1, )" + keys + "}").string();
+  }
   std::string out() const { return (folder_ / "run").string(); }
 
   TemporaryFolder folder_;
 };
 
-const std::string kPendulum = R"("duration": 0.1, "bodies": [{"type": "soft", "name": "a, b", "points": [[0,0,0],[1,0,0]],
+const std::string kPendulum =
+    R"("duration": 0.1, "bodies": [{"type": "soft", "name": "a, b", "points": [[0,0,0],[1,0,0]],
     "mass": 2, "springs": [{"points": [0,1], "stiffness": 500}], "pins": [0]}])";
 
 std::vector<std::string> lines_of(const std::string& text) {
@@ -73,9 +76,11 @@ TEST_F(Command, TheSameRunGivesTheSameBytesAtAnyThreadCount) {
 }
 
 TEST_F(Command, ExportsMovingMeshes) {
-  const std::string keys = R"("duration": 0.1, "bodies": [{"type": "soft", "name": "x/y", "grid": {"size": [1, 1], "points": [3, 3]}}])";
+  const std::string keys =
+      R"("duration": 0.1, "bodies": [{"type": "soft", "name": "x/y", "grid": {"size": [1, 1], "points": [3, 3]}}])";
   for (const char* format : {"obj", "ply", "pc2"})
-    EXPECT_EQ(run("simulate " + scene(keys) + " --export " + std::string(format) + " --out " + out()).code, 0) << format;
+    EXPECT_EQ(run("simulate " + scene(keys) + " --export " + std::string(format) + " --out " + out()).code, 0)
+        << format;
   EXPECT_TRUE(exists(folder_ / "run/x_y.0006.obj"));
   EXPECT_TRUE(exists(folder_ / "run/x_y.0006.ply"));
   EXPECT_EQ(std::filesystem::file_size(folder_ / "run/x_y.pc2"), 32u + 7 * 9 * 12);
@@ -98,7 +103,8 @@ TEST_F(Command, ABlowUpIsExitCodeOneAndKeepsTheLastGoodState) {
 
 TEST_F(Command, BadInputIsExitCodeTwoAndOneLine) {
   const std::string good = scene(kPendulum);
-  const std::string broken = folder_.write("broken.json", R"({"hooke": 1, "bodies": [{"type": "soft", "points": 7}]})").string();
+  const std::string broken =
+      folder_.write("broken.json", R"({"hooke": 1, "bodies": [{"type": "soft", "points": 7}]})").string();
   const std::string cut = folder_.write("cut.json", R"({"hooke": 1, "bod)").string();
   const std::string named = "\"" + folder_.write("line\nbreak.json", "{").string() + "\"";
   const std::vector<std::pair<std::string, std::string>> cases{
@@ -155,7 +161,8 @@ TEST_F(Command, OutputsThatCannotBeWrittenAreExitCodeThree) {
 }
 
 TEST_F(Command, ATerminatedRunKeepsItsFinishedFrames) {
-  const std::string file = scene(R"("duration": 1000, "bodies": [{"type": "soft", "grid": {"size": [1, 1], "points": [9, 9]}, "pin": "top"}])");
+  const std::string file = scene(
+      R"("duration": 1000, "bodies": [{"type": "soft", "grid": {"size": [1, 1], "points": [9, 9]}, "pin": "top"}])");
   const pid_t child = fork();
   if (child == 0) {
     std::freopen((folder_ / "log.txt").c_str(), "w", stdout);
@@ -163,7 +170,8 @@ TEST_F(Command, ATerminatedRunKeepsItsFinishedFrames) {
     execl(HOOKE_COMMAND, HOOKE_COMMAND, "simulate", file.c_str(), "--out", out().c_str(), "--export", "pc2", nullptr);
     _exit(99);
   }
-  for (int i = 0; i < 1000 && !exists(folder_ / "run/body0.part.pc2"); ++i) std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  for (int i = 0; i < 1000 && !exists(folder_ / "run/body0.part.pc2"); ++i)
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));
   std::this_thread::sleep_for(std::chrono::milliseconds(200));
   kill(child, SIGTERM);
   int status = 0;
@@ -179,12 +187,14 @@ TEST_F(Command, ATerminatedRunKeepsItsFinishedFrames) {
 TEST_F(Command, ValidatesWithTheLargestStableStepOfEveryMethod) {
   const Result result = run("validate hanging-sheet-32");
   EXPECT_EQ(result.code, 0);
-  for (const char* words : {"1024 points (32 held), 5826 springs", "implicit-euler         any", "rk4 ", "valid", "0.3 kg"})
+  for (const char* words :
+       {"1024 points (32 held), 5826 springs", "implicit-euler         any", "rk4 ", "valid", "0.3 kg"})
     EXPECT_THAT(result.out, HasSubstr(words));
 }
 
 TEST_F(Command, WarnsOfAStepThatIsNotStable) {
-  const Result result = run("validate " + scene(R"("bodies": [{"type": "soft", "grid": {"size": [1, 1], "points": [9, 9]},
+  const Result result =
+      run("validate " + scene(R"("bodies": [{"type": "soft", "grid": {"size": [1, 1], "points": [9, 9]},
       "solver": {"dt": 0.004}}])"));
   EXPECT_EQ(result.code, 0);
   EXPECT_THAT(result.out, HasSubstr("warning: the step is above the largest stable one"));

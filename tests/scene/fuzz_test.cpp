@@ -27,12 +27,23 @@ class Mutator {
     for (std::size_t i = 0, n = 1 + below(4); i < n && !text.empty(); ++i) {
       const std::size_t at = below(text.size());
       switch (below(6)) {
-        case 0: text[at] = char(below(256)); break;
-        case 1: text.erase(at, 1 + below(10)); break;
-        case 2: text.insert(at, text.substr(below(text.size()), below(40))); break;
-        case 3: text.resize(at); break;
-        case 4: text.insert(at, 1, "[]{}\",:-.0e"[below(11)]); break;
-        default: text[at] = char(text[at] ^ char(1 << below(8)));
+        case 0:
+          text[at] = char(below(256));
+          break;
+        case 1:
+          text.erase(at, 1 + below(10));
+          break;
+        case 2:
+          text.insert(at, text.substr(below(text.size()), below(40)));
+          break;
+        case 3:
+          text.resize(at);
+          break;
+        case 4:
+          text.insert(at, 1, "[]{}\",:-.0e"[below(11)]);
+          break;
+        default:
+          text[at] = char(text[at] ^ char(1 << below(8)));
       }
     }
     return text;
@@ -54,9 +65,30 @@ class Mutator {
       }
       here = &*child;
     }
-    static const std::vector<Json> values{nullptr, true, 0, 1, -1, 2, 1e300, -1e300, 1e-300, 4000000000u, 0.5, 1e9, "",
-                                          "top", "soft", "float", "verlet", Json::array(), Json::object(), {0, 0, 0},
-                                          {1, 2}, {{0, 0, 0}, {0, 0, 0}}, -0.0, 12345678901234567890u};
+    static const std::vector<Json> values{nullptr,
+                                          true,
+                                          0,
+                                          1,
+                                          -1,
+                                          2,
+                                          1e300,
+                                          -1e300,
+                                          1e-300,
+                                          4000000000u,
+                                          0.5,
+                                          1e9,
+                                          "",
+                                          "top",
+                                          "soft",
+                                          "float",
+                                          "verlet",
+                                          Json::array(),
+                                          Json::object(),
+                                          {0, 0, 0},
+                                          {1, 2},
+                                          {{0, 0, 0}, {0, 0, 0}},
+                                          -0.0,
+                                          12345678901234567890u};
     *here = values[below(values.size())];
   }
 

@@ -45,7 +45,8 @@ TEST(Manual, DescribesEveryKeyOfEveryObject) {
     const auto begin = manual.find("\n### " + kind + "\n");
     ASSERT_NE(begin, std::string::npos) << kind;
     const std::string section = manual.substr(begin, manual.find("\n### ", begin + 1) - begin);
-    for (const std::string& key : keys) EXPECT_NE(section.find("| `" + key + "` |"), std::string::npos) << kind << "." << key;
+    for (const std::string& key : keys)
+      EXPECT_NE(section.find("| `" + key + "` |"), std::string::npos) << kind << "." << key;
   }
 }
 

@@ -41,7 +41,11 @@ class Sequence final : public MeshCache {
   using Writer = void (*)(const std::filesystem::path&, const Points<double>&, const std::vector<Triangle>&);
   Sequence(const std::filesystem::path& folder, std::string_view name, std::string extension, Writer writer,
            std::vector<Triangle> triangles)
-      : folder_(folder), name_(name), extension_(std::move(extension)), writer_(writer), triangles_(std::move(triangles)) {}
+      : folder_(folder),
+        name_(name),
+        extension_(std::move(extension)),
+        writer_(writer),
+        triangles_(std::move(triangles)) {}
 
   void add(const Points<double>& vertices) override {
     if (count_ == 0) size_ = vertices.rows();
@@ -68,7 +72,8 @@ class PointCache final : public MeshCache {
   static constexpr std::int64_t kCountAt = 28;
 
   PointCache(const std::filesystem::path& folder, std::string_view name, std::vector<Triangle> triangles)
-      : path_(folder / (std::string(name) + ".pc2")), mesh_path_(folder / (std::string(name) + ".obj")),
+      : path_(folder / (std::string(name) + ".pc2")),
+        mesh_path_(folder / (std::string(name) + ".obj")),
         triangles_(std::move(triangles)) {}
 
   void add(const Points<double>& vertices) override {
@@ -111,7 +116,8 @@ class PointCache final : public MeshCache {
 
 }  // namespace
 
-void write_obj(const std::filesystem::path& path, const Points<double>& vertices, const std::vector<Triangle>& triangles) {
+void write_obj(const std::filesystem::path& path, const Points<double>& vertices,
+               const std::vector<Triangle>& triangles) {
   OutputFile file(path);
   for (Index i = 0; i < vertices.rows(); ++i) {
     file.write("v");
@@ -122,11 +128,13 @@ void write_obj(const std::filesystem::path& path, const Points<double>& vertices
     file.write("\n");
   }
   for (const Triangle& t : triangles)
-    file.write("f " + std::to_string(t[0] + 1) + " " + std::to_string(t[1] + 1) + " " + std::to_string(t[2] + 1) + "\n");
+    file.write("f " + std::to_string(t[0] + 1) + " " + std::to_string(t[1] + 1) + " " + std::to_string(t[2] + 1) +
+               "\n");
   file.commit();
 }
 
-void write_ply(const std::filesystem::path& path, const Points<double>& vertices, const std::vector<Triangle>& triangles) {
+void write_ply(const std::filesystem::path& path, const Points<double>& vertices,
+               const std::vector<Triangle>& triangles) {
   Bytes bytes;
   bytes.add("ply\nformat binary_little_endian 1.0\nelement vertex " + std::to_string(vertices.rows()) +
             "\nproperty float x\nproperty float y\nproperty float z\nelement face " + std::to_string(triangles.size()) +
@@ -151,9 +159,12 @@ CacheFormat cache_format_named(std::string_view name) {
 std::unique_ptr<MeshCache> make_mesh_cache(CacheFormat format, const std::filesystem::path& folder,
                                            std::string_view name, std::vector<Triangle> triangles) {
   switch (format) {
-    case CacheFormat::Obj: return std::make_unique<Sequence>(folder, name, ".obj", write_obj, std::move(triangles));
-    case CacheFormat::Ply: return std::make_unique<Sequence>(folder, name, ".ply", write_ply, std::move(triangles));
-    case CacheFormat::Pc2: return std::make_unique<PointCache>(folder, name, std::move(triangles));
+    case CacheFormat::Obj:
+      return std::make_unique<Sequence>(folder, name, ".obj", write_obj, std::move(triangles));
+    case CacheFormat::Ply:
+      return std::make_unique<Sequence>(folder, name, ".ply", write_ply, std::move(triangles));
+    case CacheFormat::Pc2:
+      return std::make_unique<PointCache>(folder, name, std::move(triangles));
   }
   throw std::invalid_argument("make_mesh_cache: no such format");
 }

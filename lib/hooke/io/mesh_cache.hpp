@@ -36,7 +36,9 @@ std::unique_ptr<MeshCache> make_mesh_cache(CacheFormat format, const std::filesy
                                            std::string_view name, std::vector<Triangle> triangles);
 
 /// One mesh as an OBJ or binary PLY file. Throws hooke::OutputError.
-void write_obj(const std::filesystem::path& path, const Points<double>& vertices, const std::vector<Triangle>& triangles);
-void write_ply(const std::filesystem::path& path, const Points<double>& vertices, const std::vector<Triangle>& triangles);
+void write_obj(const std::filesystem::path& path, const Points<double>& vertices,
+               const std::vector<Triangle>& triangles);
+void write_ply(const std::filesystem::path& path, const Points<double>& vertices,
+               const std::vector<Triangle>& triangles);
 
 }  // namespace hooke::io

@@ -51,7 +51,8 @@ class Check {
 
   /// Returns the coordinates of all vertices, correctly rounded, which the loader's are not.
   std::vector<double> run() {
-    if (text_.find('\0') != std::string_view::npos) throw Error(path_.string() + ": not an OBJ file: it has bytes of 0");
+    if (text_.find('\0') != std::string_view::npos)
+      throw Error(path_.string() + ": not an OBJ file: it has bytes of 0");
     std::string_view rest = text_;
     while (!rest.empty()) {
       ++line_;
@@ -127,8 +128,8 @@ TriangleMesh read_obj(const std::filesystem::path& path) {
   if (!tinyobj::LoadObj(&attributes, &shapes, &materials, &warning, &error, &stream))
     throw Error(path.string() + ": " + (error.empty() ? "not an OBJ file" : error.substr(0, error.find('\n'))));
   if (Index(attributes.vertices.size()) != 3 * count)
-    throw Error(path.string() + ": " + std::to_string(attributes.vertices.size() / 3) + " vertices were understood of " +
-                std::to_string(count));
+    throw Error(path.string() + ": " + std::to_string(attributes.vertices.size() / 3) +
+                " vertices were understood of " + std::to_string(count));
 
   TriangleMesh mesh;
   mesh.vertices.resize(count, 3);
@@ -140,7 +141,8 @@ TriangleMesh read_obj(const std::filesystem::path& path) {
       for (std::size_t k = 0; k < 3; ++k) {
         triangle[k] = shape.mesh.indices[i + k].vertex_index;
         if (triangle[k] < 0 || triangle[k] >= count)
-          throw Error(path.string() + ": a face uses vertex " + std::to_string(triangle[k]) + " of " + std::to_string(count));
+          throw Error(path.string() + ": a face uses vertex " + std::to_string(triangle[k]) + " of " +
+                      std::to_string(count));
       }
       mesh.triangles.push_back(triangle);
     }

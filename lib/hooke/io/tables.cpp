@@ -14,9 +14,7 @@ std::string csv_field(std::string_view text) {
   return out + '"';
 }
 
-StateTable::StateTable(const std::filesystem::path& path) : file_(path) {
-  file_.write("body,index,x,y,z,vx,vy,vz\n");
-}
+StateTable::StateTable(const std::filesystem::path& path) : file_(path) { file_.write("body,index,x,y,z,vx,vy,vz\n"); }
 
 void StateTable::add(std::string_view body, const Points<double>& x, const Points<double>& v) {
   if (x.rows() != v.rows()) throw std::invalid_argument("StateTable: positions and velocities differ in number");

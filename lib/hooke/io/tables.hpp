@@ -44,10 +44,10 @@ class NumberTable {
 
 /// What is measured once a frame.
 struct Diagnostics {
-  double time = 0;                                         ///< [s]
-  double kinetic = 0, gravitational = 0, elastic = 0;      ///< [J]
-  Vec3 momentum{0, 0, 0};                                  ///< [kg m/s]
-  double worst_stretch = 0;  ///< largest strain of a structural spring, 0 where there is none
+  double time = 0;                                     ///< [s]
+  double kinetic = 0, gravitational = 0, elastic = 0;  ///< [J]
+  Vec3 momentum{0, 0, 0};                              ///< [kg m/s]
+  double worst_stretch = 0;                            ///< largest strain of a structural spring, 0 where there is none
 };
 
 /// time,kinetic,gravitational,elastic,total,momentum_x,momentum_y,momentum_z,worst_stretch
@@ -63,7 +63,7 @@ class DiagnosticsTable {
 
 /// How long the stages of one frame took.
 struct Timings {
-  double time = 0;                               ///< [s], simulated
+  double time = 0;                              ///< [s], simulated
   double simulate = 0, measure = 0, write = 0;  ///< [ms]
 };
 
