@@ -83,7 +83,9 @@ TEST(SpringField, StiffnessIsTheSlopeOfTheForceAndTheSafeOneIsPositive) {
   SCOPED_TRACE(random.trace());
   const Index n = 10;
   const Points<double> x = random.points(n, 1), v = random.points(n, 1);
-  const auto field = field_of(random_network(random, n, 40, true), x);
+  SpringNetwork network = random_network(random, n, 40, true);
+  network.springs.push_back({0, 1, 500, 1, 10});  // compressed for certain
+  const auto field = field_of(network, x);
   const double step = 1e-6;
   const auto differences = matrix_of(n, [&](const Points<double>& d, Points<double>& out) {
     out = (force(field, Points<double>(x - step * d), none(n)) - force(field, Points<double>(x + step * d), none(n))) / (2 * step);
