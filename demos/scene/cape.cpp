@@ -15,6 +15,8 @@ namespace {
 constexpr double kHalfWidth = 0.15, kHalfDepth = 0.066, kBehindNeck = 0.012;
 constexpr double kEnd = 130 * std::numbers::pi / 180;  // how far around the neck, from the nape
 constexpr int kPleats = 9;
+constexpr double kHem = 4;  // layers in the hem of the sides, for mass and stiffness alike
+constexpr double kFlatEnd = 0.12;  // share of the heading over which pleats grow from nothing
 
 // The person from above: where the neck is, and which way it looks.
 struct Shoulders {
@@ -66,7 +68,10 @@ Points<double> heading(const Shoulders& s, const CapeSettings& settings, double 
   std::vector<double> length{0};
   for (int i = 0; i <= kFine; ++i) {
     const double share = double(i) / kFine, angle = kEnd * (1 - 2 * share);
-    const double out = amplitude * (1 - std::cos(2 * std::numbers::pi * kPleats * share));
+    // The ends lie flat: in a pleat they would take the load of their neighbours.
+    const double end = std::min(1.0, std::min(share, 1 - share) / kFlatEnd);
+    const double out =
+        amplitude * end * end * (3 - 2 * end) * (1 - std::cos(2 * std::numbers::pi * kPleats * share));
     const double left = (kHalfWidth + out) * std::sin(angle);
     const double back = kBehindNeck + (kHalfDepth + out) * std::cos(angle);
     fine.push_back(dropped(s, settings.thickness, s.neck + left * s.left - back * s.forward));
@@ -95,10 +100,21 @@ Cape dress(const human::Human& human, const CapeSettings& s, double t0) {
   Cape cape;
   cape.cloth = softbody::cloth_from_grid(s.width, s.height, s.columns, s.rows, {1, 0, 0}, {0, -1, 0}, s.material);
 
-  // Rest lengths are those of the flat cloth, not of the gathered one.
+  // Rest lengths are those of the flat cloth, not of the gathered one. The sides are hemmed:
+  // folded over, they are heavier and stiffer along, as the free edges carry more than the middle.
   softbody::SpringNetwork network = *cape.cloth.network;
   const std::vector<double> rest = rest_lengths(network, cape.cloth.positions);
-  for (std::size_t i = 0; i < rest.size(); ++i) network.springs[i].rest_length = rest[i];
+  const auto hemmed = [&](int point) { return point % s.columns == 0 || point % s.columns == s.columns - 1; };
+  for (std::size_t i = 0; i < rest.size(); ++i) {
+    softbody::Spring& spring = network.springs[i];
+    spring.rest_length = rest[i];
+    if (spring.family == softbody::Family::Stretch && hemmed(spring.a) && spring.b - spring.a == s.columns) {
+      spring.stiffness *= kHem;
+      spring.damping *= kHem;
+    }
+  }
+  for (int i = 0; i < int(cape.cloth.masses.size()); ++i)
+    if (hemmed(i)) cape.cloth.masses[i] *= kHem;
   cape.cloth.network = std::make_shared<const softbody::SpringNetwork>(std::move(network));
 
   const Shoulders shoulders = shoulders_of(human, t0);
