@@ -120,7 +120,7 @@ void draw_caption(Image& image, const std::vector<std::string>& lines) {
   for (const std::string& line : lines) longest = std::max(longest, line.size());
   if (longest == 0 || image.width <= 0 || image.height <= 0) return;
 
-  const double dot = std::max(1.0, image.height / 430.0);
+  const double dot = std::max(1.0, image.height / 540.0);
   const double advance = 6.2 * dot, leading = 11.5 * dot, pad = 7 * dot, edge = 12 * dot;
   const double height = leading * double(lines.size()) - 3.5 * dot + 2 * pad;
   const double room = image.width - 2 * edge;

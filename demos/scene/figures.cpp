@@ -65,13 +65,13 @@ void CapeFigures::measure(const Scene& scene) {
   cape.targets(scene.world.time(), targets);
   for (Index i = 0; i < targets.rows(); ++i)
     pin_error_ = std::max(pin_error_, (x.row(cape.driven[std::size_t(i)]) - targets.row(i)).matrix().norm());
-  if (t >= freeze_ + kSettlingInterval * double(settling_.size()) - 1e-9) {
-    const Points<double> v = cape.body->velocities();
-    double sum = 0;
-    Index free = 0;
-    for (Index i = 0; i < v.rows(); ++i)
-      if (!cape.held[std::size_t(i)]) sum += v.row(i).matrix().squaredNorm(), ++free;
-    settling_.emplace_back(t, free ? std::sqrt(sum / double(free)) : 0);
+  if (t <= freeze_ + 1e-9) return;
+  const Points<double> v = cape.body->velocities();
+  for (Index i = 0; i < v.rows(); ++i)
+    if (!cape.held[std::size_t(i)]) speed_squared_ += v.row(i).matrix().squaredNorm(), ++speeds_;
+  if (t >= freeze_ + kSettlingInterval * double(settling_.size() + 1) - 1e-9) {
+    settling_.emplace_back(t, speeds_ ? std::sqrt(speed_squared_ / double(speeds_)) : 0);
+    speed_squared_ = 0, speeds_ = 0;
   }
 }
 
@@ -106,7 +106,7 @@ std::string CapeFigures::text() const {
                 100 * stretch_percentile(0.999), 100 * worst_stretch(), worst_time_);
   out += format("  greatest pin error: %.3g mm\n", 1e3 * pin_error_);
   for (const auto& [time, speed] : settling_)
-    out += format("  RMS speed %.2f s after the last step: %.4f m/s\n", time - freeze_, speed);
+    out += format("  RMS speed in the half second to %.1f s after the last step: %.4f m/s\n", time - freeze_, speed);
   return out;
 }
 

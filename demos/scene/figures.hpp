@@ -34,7 +34,7 @@ class CapeFigures {
   double pin_error() const { return pin_error_; }  ///< greatest distance of a pin from where it should be [m]
   double worst_stretch() const;
   double stretch_percentile(double share) const;  ///< of all structural springs in all frames
-  /// (time [s], RMS speed of the free points [m/s]) each half second from the wearer's last step on.
+  /// (end of it [s], RMS over free points and looks [m/s]) of each half second after the wearer's last step.
   const std::vector<std::pair<double, double>>& settling() const { return settling_; }
 
   /// All of it, a line each.
@@ -50,6 +50,8 @@ class CapeFigures {
   float worst_ = 0;
   mutable std::vector<float> strains_;
   std::vector<std::pair<double, double>> settling_;
+  double speed_squared_ = 0;
+  Index speeds_ = 0;
 };
 
 }  // namespace hooke::scene
