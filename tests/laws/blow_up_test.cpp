@@ -111,7 +111,7 @@ TEST(ImplicitEuler, SolvesItsEquationToTheTolerance) {
   SCOPED_TRACE(random.trace());
   const double h = 1.0 / 60;
   const Index n = 30;
-  const Points<double> x = random.points(n, 1), v = random.points(n, 1);
+  const Points<double> x = random.points(n, 3), v = random.points(n, 1);
   auto network = std::make_shared<softbody::SpringNetwork>();
   for (int i = 0; i < 80; ++i) {
     const int a = random.below(int(n)), b = (a + 1 + random.below(int(n) - 1)) % int(n);
@@ -122,7 +122,7 @@ TEST(ImplicitEuler, SolvesItsEquationToTheTolerance) {
   body->add_field(std::make_unique<softbody::SpringField<double>>(network, body->state().position));
   body->pin(3);
   const softbody::SpringField<double> field(network, x);
-  for (int step = 0; step < 30; ++step) {
+  for (int step = 0; step < 10; ++step) {
     const Points<double> before_x = body->state().position, before_v = body->state().velocity;
     const StepReport report = body->advance({h * step, h * (step + 1), {0, -9.81, 0}, {}});
     ASSERT_TRUE(report.good()) << report.text();
