@@ -11,7 +11,7 @@ function(hooke_common target)
     if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
       # gcc 12 reports false positives inside Eigen at -O2.
       target_compile_options(${target} PRIVATE -Wno-maybe-uninitialized -Wno-null-dereference
-                                               -Wno-array-bounds -Wno-stringop-overflow)
+                                               -Wno-array-bounds -Wno-stringop-overflow -Wno-restrict)
     endif()
   endif()
 endfunction()

@@ -31,36 +31,6 @@ auto told_at(const SceneDescription& scene, const std::string& path, const Work&
   }
 }
 
-// Wind whose clock starts with the first shown frame.
-template <class S>
-class ShownWind final : public ForceField<S> {
- public:
-  ShownWind(const softbody::Wind& wind, const std::vector<Triangle>& triangles, Index count, double preroll)
-      : wind_(wind, triangles, count), preroll_(preroll) {}
-  bool uses_velocity() const override { return wind_.uses_velocity(); }
-  void add_force(const Points<S>& x, const Points<S>& v, double t, Points<S>& f) const override {
-    wind_.add_force(x, v, t - preroll_, f);
-  }
-  void add_damping_times(const Points<S>& x, const Points<S>& v, const Points<S>& d, Points<S>& out) const override {
-    wind_.add_damping_times(x, v, d, out);
-  }
-  typename ForceField<S>::Rates rate_bounds(const Points<S>& x, const Points<S>& v,
-                                            const Values<S>& inverse_mass) const override {
-    return wind_.rate_bounds(x, v, inverse_mass);
-  }
-
- private:
-  softbody::WindField<S> wind_;
-  double preroll_;
-};
-
-template <class S>
-bool add_wind(Body& body, const softbody::Wind& wind, const std::vector<Triangle>& triangles, double preroll) {
-  auto* points = dynamic_cast<PointBody<S>*>(&body);
-  if (points) points->add_field(std::make_unique<ShownWind<S>>(wind, triangles, body.size(), preroll));
-  return points != nullptr;
-}
-
 softbody::Cloth cloth_of(const Grid& grid, const Material& material) {
   const auto make = [&](const softbody::ClothMaterial& cloth) {
     return softbody::cloth_from_grid(grid.width, grid.height, grid.columns, grid.rows, grid.right, grid.down, cloth);
@@ -231,13 +201,12 @@ class Builder {
     settings.motion.method = &method_named(description.solver.method);
     settings.precision = description.solver.precision;
 
-    std::unique_ptr<Body> body = told_at(d_, description.path, [&] {
-      std::unique_ptr<Body> made = softbody::make_soft_body(settings);
-      if (description.wind && !(add_wind<float>(*made, *description.wind, settings.triangles, d_.preroll) ||
-                                add_wind<double>(*made, *description.wind, settings.triangles, d_.preroll)))
-        throw Error("this body takes no wind");
-      return made;
-    });
+    if (description.wind) {
+      settings.wind = description.wind;
+      settings.wind->start = d_.preroll;  // its clock is the shown time
+    }
+
+    std::unique_ptr<Body> body = told_at(d_, description.path, [&] { return softbody::make_soft_body(settings); });
     out.triangles = settings.triangles;
     out.network = settings.network;
     out.rest = softbody::rest_lengths(*settings.network, settings.positions);

@@ -15,7 +15,9 @@ namespace {
 constexpr double kHalfWidth = 0.15, kHalfDepth = 0.066, kBehindNeck = 0.012;
 constexpr double kEnd = 130 * std::numbers::pi / 180;  // how far around the neck, from the nape
 constexpr int kPleats = 9;
-constexpr double kHem = 4;  // layers in the hem of the sides, for mass and stiffness alike
+// Layers of cloth in the hem of the sides and in the collar, for mass and stiffness alike, and how
+// many rows of points the collar has below the heading: both spread what few pins would carry.
+constexpr int kHemLayers = 4, kCollarLayers = 4, kCollarRows = 5;
 constexpr double kFlatEnd = 0.12;  // share of the heading over which pleats grow from nothing
 
 // The person from above: where the neck is, and which way it looks.
@@ -100,21 +102,21 @@ Cape dress(const human::Human& human, const CapeSettings& s, double t0) {
   Cape cape;
   cape.cloth = softbody::cloth_from_grid(s.width, s.height, s.columns, s.rows, {1, 0, 0}, {0, -1, 0}, s.material);
 
-  // Rest lengths are those of the flat cloth, not of the gathered one. The sides are hemmed:
-  // folded over, they are heavier and stiffer along, as the free edges carry more than the middle.
+  // Rest lengths are those of the flat cloth, not of the gathered one.
   softbody::SpringNetwork network = *cape.cloth.network;
   const std::vector<double> rest = rest_lengths(network, cape.cloth.positions);
-  const auto hemmed = [&](int point) { return point % s.columns == 0 || point % s.columns == s.columns - 1; };
+  const auto layers = [&](int point) {
+    const int row = point / s.columns, column = point % s.columns;
+    return std::max(column == 0 || column == s.columns - 1 ? kHemLayers : 1, row <= kCollarRows ? kCollarLayers : 1);
+  };
   for (std::size_t i = 0; i < rest.size(); ++i) {
     softbody::Spring& spring = network.springs[i];
+    const int sewn = std::min(layers(spring.a), layers(spring.b));
     spring.rest_length = rest[i];
-    if (spring.family == softbody::Family::Stretch && hemmed(spring.a) && spring.b - spring.a == s.columns) {
-      spring.stiffness *= kHem;
-      spring.damping *= kHem;
-    }
+    spring.stiffness *= sewn;
+    spring.damping *= sewn;
   }
-  for (int i = 0; i < int(cape.cloth.masses.size()); ++i)
-    if (hemmed(i)) cape.cloth.masses[i] *= kHem;
+  for (Index i = 0; i < cape.cloth.masses.size(); ++i) cape.cloth.masses[i] *= layers(int(i));
   cape.cloth.network = std::make_shared<const softbody::SpringNetwork>(std::move(network));
 
   const Shoulders shoulders = shoulders_of(human, t0);

@@ -205,6 +205,7 @@ softbody::Wind read_wind(const Object& object) {
   wind.gust_period = object.number("gust_period", wind.gust_period, Range::positive(), "s");
   wind.swing = object.number("swing", wind.swing, Range::any(), "rad");
   wind.stop = object.number("stop", wind.stop, Range::any(), "s");
+  if (object.has("once_a_tick")) wind.once_a_tick = object["once_a_tick"].truth();
   wind.fade = object.number("fade", wind.fade, Range::not_negative(), "s");
   wind.air_density = object.number("air_density", wind.air_density, Range::not_negative(), "kg/m3");
   wind.drag = object.number("drag", wind.drag, Range::not_negative());

@@ -122,7 +122,7 @@ const KeyTable& key_table() {
       {"motion", {"translate", "swing", "keys"}},
       {"swing", {"amplitude", "period"}},
       {"key", {"time", "offset"}},
-      {"wind", {"velocity", "gust", "gust_period", "swing", "stop", "fade", "air_density", "drag", "lift", "seed"}},
+      {"wind", {"velocity", "gust", "gust_period", "swing", "stop", "fade", "air_density", "drag", "lift", "seed", "once_a_tick"}},
       {"drag", {"linear", "quadratic"}},
       {"solver", {"method", "dt", "precision"}},
       {"half_space", {"type", "name", "normal", "offset", "friction", "restitution"}},

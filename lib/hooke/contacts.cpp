@@ -26,11 +26,13 @@ void set_row(Points<S>& p, Index i, const Eigen::Matrix<S, 3, 1>& value) {
 // First root in [0, 1] of |d + s m|² = r², or infinity. `d` starts outside.
 template <class S>
 S sphere_entry(const Eigen::Matrix<S, 3, 1>& d, const Eigen::Matrix<S, 3, 1>& m, S r) {
-  const S a = m.squaredNorm(), b = d.dot(m), c = d.squaredNorm() - r * r;
-  const S discriminant = b * b - a * c;
-  if (a == 0 || b >= 0 || discriminant < 0) return std::numeric_limits<S>::infinity();
-  const S s = c / (-b + std::sqrt(discriminant));
-  return s >= 0 && s <= 1 ? s : std::numeric_limits<S>::infinity();
+  const S a = m.squaredNorm(), b = d.dot(m);
+  if (a == 0 || b >= 0) return std::numeric_limits<S>::infinity();
+  // By the closest approach: b² - a c would cancel where the way is long and the solid small.
+  const S closest2 = (d - (b / a) * m).squaredNorm();
+  if (closest2 > r * r) return std::numeric_limits<S>::infinity();
+  const S s = -b / a - std::sqrt((r * r - closest2) / a);
+  return s <= 1 ? std::max(s, S(0)) : std::numeric_limits<S>::infinity();
 }
 
 }  // namespace
@@ -96,35 +98,49 @@ void Contacts<S>::begin_tick(std::span<const Collider> colliders, const PointMas
   find_candidates(points.position, points.velocity, t1 - t0);
 }
 
+// Pairs of points and solids that may meet within `seconds`. Whole runs of points are ruled out by
+// their box first: neighbours in memory are mostly neighbours in space.
 template <class S>
 void Contacts<S>::find_candidates(const Points<S>& x, const Points<S>& v, double seconds) {
+  constexpr Index kRun = 64;
   start_ = x;
   reach_ = (S(1.5) * S(seconds)) * (v.square().rowwise().sum().sqrt()) + S(kSlack);
   candidates_.clear();
-  const Vec lower = x.colwise().minCoeff().matrix().transpose(), upper = x.colwise().maxCoeff().matrix().transpose();
-  const S farthest = reach_.maxCoeff();
+  const Index runs = (x.rows() + kRun - 1) / kRun;
+  lower_.resize(runs, 3), upper_.resize(runs, 3), farthest_.resize(runs);
+  for (Index run = 0; run < runs; ++run) {
+    const Index first = run * kRun, n = std::min(kRun, x.rows() - first);
+    lower_.row(run) = x.middleRows(first, n).colwise().minCoeff();
+    upper_.row(run) = x.middleRows(first, n).colwise().maxCoeff();
+    farthest_[run] = reach_.segment(first, n).maxCoeff();
+  }
   for (std::size_t s = 0; s < solids_.size(); ++s) {
     const Solid& solid = solids_[s];
-    const S near = solid.radius + farthest + solid_move_[s];
-    if (solid.kind == Kind::HalfSpace) {
-      gap_ = x.col(0) * solid.a[0] + x.col(1) * solid.a[1] + x.col(2) * solid.a[2] - solid.radius;
-    } else {
-      const Vec low = solid.a.cwiseMin(solid.b), high = solid.a.cwiseMax(solid.b);
-      if (((low.array() - near) > upper.array()).any() || ((high.array() + near) < lower.array()).any()) continue;
-      const Vec axis = solid.b - solid.a;
-      const S inverse = axis.squaredNorm() > 0 ? 1 / axis.squaredNorm() : S(0);
-      gap_ = (((x.col(0) - solid.a[0]) * axis[0] + (x.col(1) - solid.a[1]) * axis[1] +
-               (x.col(2) - solid.a[2]) * axis[2]) *
-              inverse)
-                 .max(S(0))
-                 .min(S(1));
-      gap_ = ((x.col(0) - solid.a[0] - gap_ * axis[0]).square() + (x.col(1) - solid.a[1] - gap_ * axis[1]).square() +
-              (x.col(2) - solid.a[2] - gap_ * axis[2]).square())
-                 .sqrt() -
-             solid.radius;
+    const Vec axis = solid.b - solid.a;
+    const S inverse = axis.squaredNorm() > 0 ? 1 / axis.squaredNorm() : S(0);
+    for (Index run = 0; run < runs; ++run) {
+      const Index first = run * kRun, n = std::min(kRun, x.rows() - first);
+      const auto px = x.col(0).segment(first, n), py = x.col(1).segment(first, n), pz = x.col(2).segment(first, n);
+      const S near = farthest_[run] + solid_move_[s];
+      if (solid.kind == Kind::HalfSpace) {
+        gap_ = px * solid.a[0] + py * solid.a[1] + pz * solid.a[2] - solid.radius;
+      } else {
+        bool apart = false;
+        for (int k = 0; k < 3; ++k)
+          apart = apart || std::min(solid.a[k], solid.b[k]) - solid.radius - near > upper_(run, k) ||
+                  std::max(solid.a[k], solid.b[k]) + solid.radius + near < lower_(run, k);
+        if (apart) continue;
+        along_ = (((px - solid.a[0]) * axis[0] + (py - solid.a[1]) * axis[1] + (pz - solid.a[2]) * axis[2]) * inverse)
+                     .max(S(0))
+                     .min(S(1));
+        gap_ = ((px - solid.a[0] - along_ * axis[0]).square() + (py - solid.a[1] - along_ * axis[1]).square() +
+                (pz - solid.a[2] - along_ * axis[2]).square())
+                   .sqrt() -
+               solid.radius;
+      }
+      for (Index i = 0; i < n; ++i)
+        if (gap_[i] <= reach_[first + i] + solid_move_[s]) candidates_.push_back({int(first + i), int(s)});
     }
-    for (Index i = 0; i < x.rows(); ++i)
-      if (gap_[i] <= reach_[i] + solid_move_[s]) candidates_.push_back({int(i), int(s)});
   }
 }
 
@@ -204,9 +220,10 @@ void Contacts<S>::touch(Index point, const Solid& before, const Solid& after, co
   if (at.gap >= 0 && (x - from).norm() + move <= at.gap) return;  // cannot have been inside on the way
   const Vec start = carried(before, after, from);
   const S start_gap = surface(after, start).gap;
-  // Through, or so deep that the nearest surface may be the wrong one: go by where it went in.
+  // Through, or so far on that the nearest surface may be the wrong one: go by where it went in.
   Vec hit;
-  if (start_gap >= 0 && (at.gap >= 0 || at.gap < S(-0.25) * after.radius) && entry(after, start, x, hit)) {
+  const bool far = at.gap >= 0 || (x - start).squaredNorm() > after.radius * after.radius;
+  if (start_gap >= 0 && far && after.kind != Kind::HalfSpace && entry(after, start, x, hit)) {
     const Vec normal = surface(after, hit).normal;
     const S beyond = (x - hit).dot(normal);
     at = {beyond, normal};

@@ -77,8 +77,8 @@ class Contacts {
   std::vector<Candidate> candidates_;
   std::vector<Touch> touches_;  // of the last resolve
   std::vector<const Collider*> callbacks_;
-  Points<S> start_;
-  Values<S> reach_, gap_;
+  Points<S> start_, lower_, upper_;
+  Values<S> reach_, gap_, along_, farthest_;
   Points<double> world_, normal_;
   Values<double> distance_;
 };

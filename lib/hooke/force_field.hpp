@@ -17,6 +17,10 @@ class ForceField {
   /// True where the force depends on velocity; methods that need a(x) only refuse it then.
   virtual bool uses_velocity() const = 0;
 
+  /// True where the force changes so slowly that a body may evaluate it at the start of a tick and
+  /// hold it: cheaper, but first order in the tick, and stable only while its damping rate × tick < 2.
+  virtual bool once_a_tick() const { return false; }
+
   /// f += force [N]. x [m] is relative to the body's origin, v [m/s], t [s]; shapes (n, 3).
   virtual void add_force(const Points<S>& x, const Points<S>& v, double t, Points<S>& f) const = 0;
 

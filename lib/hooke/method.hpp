@@ -16,8 +16,9 @@ struct Splitting {
 };
 
 /// Verlet in increment form: d += h² a(x); x += d, with d = x - x₋₁ stored as its own
-/// variable. Algebraically x' = x + (x - x₋₁) + a h², but increments smaller than one unit
-/// in the last place of x are not lost. The first d is v h - ½ a h² (plus the step's a h²).
+/// variable. Algebraically x' = x + (x - x₋₁) + a h², but without the difference of two nearly
+/// equal positions, in which the velocity would drown. The first d is v h - ½ a h² (plus the
+/// step's a h²).
 struct Verlet {};
 
 /// Explicit Runge-Kutta: stage[i][j] for j < i, weight[i]; forces are evaluated at the stages.

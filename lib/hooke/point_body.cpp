@@ -45,6 +45,10 @@ PointBody<S>::PointBody(std::string name, PointMasses<S> points, MotionSettings 
 
 template <class S>
 void PointBody<S>::add_field(std::unique_ptr<const ForceField<S>> field) {
+  if (field->once_a_tick()) {
+    held_fields_.push_back(std::move(field));
+    return;
+  }
   if (field->uses_velocity() && !settings_.method->accepts_velocity_forces)
     throw std::invalid_argument("body \"" + name() + "\": method " + std::string(settings_.method->name) +
                                 " accepts no forces of velocity (drag, dampers, wind)");
@@ -153,7 +157,8 @@ Energy PointBody<S>::energy(const Vec3& gravity) const {
     energy.kinetic += 0.5 * m * v.squaredNorm();
     energy.gravitational -= m * gravity.dot(x);
   }
-  for (const auto& field : fields_) energy.elastic += field->potential_energy(points_.position);
+  for (const auto* fields : {&fields_, &held_fields_})
+    for (const auto& field : *fields) energy.elastic += field->potential_energy(points_.position);
   return energy;
 }
 
@@ -202,6 +207,17 @@ void PointBody<S>::spend_bank(double seconds) {
       piece.seconds -= spent;
     if (left <= 1e-9 * seconds) break;
   }
+}
+
+// Fields that are evaluated once a tick join the pushes of the user.
+template <class S>
+void PointBody<S>::hold_fields(double t) {
+  if (held_fields_.empty()) return;
+  force_.setZero(size(), 3);
+  for (const auto& field : held_fields_) field->add_force(points_.position, points_.velocity, t, force_);
+  if (!pushing_) push_acceleration_.setZero(size(), 3);
+  push_acceleration_ += force_.colwise() * points_.inverse_mass;
+  pushing_ = true;
 }
 
 template <class S>
@@ -370,6 +386,7 @@ StepReport PointBody<S>::advance(const Tick& tick) {
   if (size() == 0) return {};
   choose_substeps(tick);
   spend_bank(tick.end - tick.start);
+  hold_fields(tick.start);
   const SolveResult solve = run_tick();
   const bool finite = points_.position.allFinite() && points_.velocity.allFinite();
   if (!finite || !solve.converged) return explain(finite);

@@ -104,6 +104,7 @@ class PointBody : public Body, protected Dynamics<S> {
   typename ForceField<S>::Rates rate_bounds() const;
   void choose_substeps(const Tick& tick);
   void spend_bank(double seconds);
+  void hold_fields(double t);
   void hold(Index point);
   SolveResult run_tick();
   StepReport explain(bool finite);
@@ -111,7 +112,7 @@ class PointBody : public Body, protected Dynamics<S> {
   MotionSettings settings_;
   Integrator<S> integrator_;
   Contacts<S> contacts_;
-  std::vector<std::unique_ptr<const ForceField<S>>> fields_;
+  std::vector<std::unique_ptr<const ForceField<S>>> fields_, held_fields_;
   bool uses_velocity_ = false;
   Points<S> start_, previous_position_, previous_velocity_, force_, damping_product_;
   std::vector<Push> pushed_;

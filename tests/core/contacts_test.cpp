@@ -81,8 +81,11 @@ void shoot_at_a_thin_rod() {
       while (std::abs(std::remainder(distance, step)) < 0.01) distance += 0.02;
       auto& body = add_point<S>(world, distance * away, -1000 * away, 0, dt);
       for (int frame = 0; frame < 3; ++frame) ASSERT_TRUE(world.update(1.0 / 60).good());
-      EXPECT_GE(row(body.positions(), 0).dot(away), 0.005 - (std::is_same_v<S, float> ? 1e-5 : 1e-9));
-      EXPECT_LT(row(body.positions(), 0).norm(), 0.02);
+      // Float resolves 2e-6 m at 20 m, which turns the normal of a rod of 5 mm by a milliradian: of
+      // 1000 m/s a metre a second or two is left, sideways.
+      constexpr bool kFloat = std::is_same_v<S, float>;
+      EXPECT_GE(row(body.positions(), 0).dot(away), 0.005 - (kFloat ? 1e-4 : 1e-9));
+      EXPECT_LT(row(body.positions(), 0).norm(), kFloat ? 0.1 : 0.02);
     }
   }
 }
@@ -90,7 +93,7 @@ void shoot_at_a_thin_rod() {
 TEST(ThinRod, StopsAPointOfAThousandMetresASecond) { shoot_at_a_thin_rod<double>(); }
 
 // A step that ends just under the far side of the rod.
-TEST(ThinRod, DISABLED_StopsAPointThatEndsItsStepInTheFarSide) {
+TEST(ThinRod, StopsAPointThatEndsItsStepInTheFarSide) {
   World world(60);
   world.enable_gravity(false);
   world.add_collider(solid(Capsule{{-1, 0, 0}, {1, 0, 0}, 0.005}));
@@ -99,8 +102,7 @@ TEST(ThinRod, DISABLED_StopsAPointThatEndsItsStepInTheFarSide) {
   EXPECT_NEAR(body.positions()(0, 1), 0.005, 1e-9);
 }
 
-// The discriminant of the entry cancels in float after a way of metres: misses, or enters late.
-TEST(ThinRod, DISABLED_StopsAPointOfAThousandMetresASecondInFloat) { shoot_at_a_thin_rod<float>(); }
+TEST(ThinRod, StopsAPointOfAThousandMetresASecondInFloat) { shoot_at_a_thin_rod<float>(); }
 
 TYPED_TEST(Contact, OfAFastLimbPushesARestingPointAlong) {
   using S = TypeParam;

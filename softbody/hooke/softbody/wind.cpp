@@ -30,6 +30,7 @@ double gust_wave(double t, double period, std::uint32_t seed) {
 }  // namespace
 
 Vec3 Wind::velocity_at(double t) const {
+  t -= start;
   if (t >= stop || velocity.isZero(0)) return Vec3::Zero();
   double strength = 1;
   if (gust > 0) strength += gust * gust_wave(t, gust_period, seed);
@@ -55,7 +56,7 @@ WindField<S>::WindField(const Wind& wind, const std::vector<Triangle>& triangles
   require(wind.velocity.allFinite(), "velocity must be finite");
   require(wind.gust >= 0 && std::isfinite(wind.gust), "gust must not be negative");
   require(wind.gust_period > 0, "gust_period must be positive");
-  require(std::isfinite(wind.swing), "swing must be finite");
+  require(std::isfinite(wind.swing) && std::isfinite(wind.start), "swing and start must be finite");
   require(wind.air_density >= 0 && wind.drag >= 0 && wind.lift >= 0 && wind.fade >= 0,
           "air_density, drag, lift and fade must not be negative");
   for (const Triangle& t : triangles)

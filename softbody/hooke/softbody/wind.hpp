@@ -15,14 +15,16 @@ struct Wind {
   double gust = 0;            ///< largest change of speed as a share of the mean, >= 0
   double gust_period = 2;     ///< of the slowest gust [s], > 0
   double swing = 0;           ///< largest change of direction, about the y axis [rad]
-  double stop = 1e300;        ///< from here on the air is still [s]
+  double start = 0;           ///< time of the world at which the wind's own clock begins [s]
+  double stop = 1e300;        ///< from here on its own clock the air is still [s]
   double fade = 0.3;          ///< before `stop`, the wind dies down over this time [s]
   double air_density = 1.204; ///< [kg/m³]
   double drag = 1.2;          ///< coefficient of a plate across the wind
   double lift = 0.6;          ///< coefficient of a plate at an angle
   std::uint32_t seed = 1;     ///< of the gusts' phases
+  bool once_a_tick = false;   ///< evaluate at the start of a tick and hold: cheaper, first order in the tick
 
-  Vec3 velocity_at(double t) const;  ///< [m/s]; a smooth function of time alone
+  Vec3 velocity_at(double t) const;  ///< [m/s] at world time t; a smooth function of time alone
 };
 
 /// Aerodynamic force on triangles, a third to each corner:
@@ -36,6 +38,7 @@ class WindField final : public ForceField<S> {
   WindField(const Wind& wind, const std::vector<Triangle>& triangles, Index point_count);
 
   bool uses_velocity() const override { return true; }
+  bool once_a_tick() const override { return wind_.once_a_tick; }
   void add_force(const Points<S>& x, const Points<S>& v, double t, Points<S>& f) const override;
   void add_damping_times(const Points<S>& x, const Points<S>& v, const Points<S>& d, Points<S>& out) const override;
   typename ForceField<S>::Rates rate_bounds(const Points<S>& x, const Points<S>& v,
