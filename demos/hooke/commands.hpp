@@ -22,6 +22,7 @@ struct RenderOptions {
   std::filesystem::path out;  ///< FILE.mp4, FILE.png or a folder for PNG files
   int width = 1280, height = 720, supersample = 1;
   std::optional<double> frame_at;  ///< [s], of a PNG
+  std::filesystem::path poster;    ///< beside a film: its poster as a PNG; empty: none
 };
 int render(const RenderOptions& options);
 

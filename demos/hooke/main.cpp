@@ -60,6 +60,7 @@ int dispatch(int argc, char** argv) {
       "Simulates and draws soft bodies.\nExit codes: 0 done, 1 diverged, 2 bad input, 3 output not writable, "
       "130 interrupted.",
       "hooke");
+  app.set_version_flag("--version", "hooke " HOOKE_VERSION);
   app.add_flag("--list", a.list, "The scenes that have a name");
   app.footer("Example: hooke render cape --out cape.mp4");
 
@@ -77,6 +78,8 @@ int dispatch(int argc, char** argv) {
   render_command->add_option("--out", a.render.out, "FILE.mp4, FILE.png or a folder for one PNG a frame")->required();
   render_command->add_option("--size", a.size, "WIDTHxHEIGHT [pixels], 1280x720 if not given");
   render_command->add_option("--frame-at", a.render.frame_at, "Moment of a PNG [s]");
+  render_command->add_option("--poster", a.render.poster,
+                             "With a film: also its poster frame as this PNG, supersampled twice");
   render_command->add_option("--supersample", a.render.supersample,
                              "1 to 4: draws that many times larger and averages");
   render_command->footer("Example: hooke render flag --out flag.png --frame-at 2.5 --size 1920x1080 --supersample 2");

@@ -60,6 +60,9 @@ int render(const RenderOptions& options) {
   if (film && (options.width % 2 || options.height % 2))
     throw Error("--size of a film must be even in both directions, got " + std::to_string(options.width) + "x" +
                 std::to_string(options.height));
+  if (!options.poster.empty() && (still || options.poster.extension() != ".png"))
+    throw Error("--poster is a PNG file beside a film; got " + options.poster.string() + " with --out " +
+                options.out.string());
   if (options.frame_at && !still) throw Error("--frame-at is for a PNG file; --out is " + options.out.string());
   scene::Scene scene = prepare(options.run);
   const scene::SceneDescription& d = scene.description;
@@ -100,6 +103,15 @@ int render(const RenderOptions& options) {
   }
   progress.finish();
   sink.finish();
+  if (!options.poster.empty() && !still && !cut) {
+    const double moment = d.poster >= 0 ? std::min(d.poster, end) : end / 2;
+    const std::size_t frame = std::min(pictures - 1, std::size_t(std::lround(moment * d.frame_rate)));
+    render::Stage large(options.width, options.height, std::max(2, options.supersample));
+    large.set_look(shot.look());
+    if (options.poster.has_parent_path()) io::make_folder(options.poster.parent_path());
+    render::write_png(options.poster, shot.draw(large, frame));
+    std::printf("%s\n", options.poster.c_str());
+  }
   std::printf("%s\n", sink.path().c_str());
   if (!result.report.good()) std::fprintf(stderr, "hooke: %s\n", result.report.text().c_str());
   return cut ? int(kInterrupted) : result.exit_code();
