@@ -72,8 +72,7 @@ Points<double> heading(const Shoulders& s, const CapeSettings& settings, double 
     const double share = double(i) / kFine, angle = kEnd * (1 - 2 * share);
     // The ends lie flat: in a pleat they would take the load of their neighbours.
     const double end = std::min(1.0, std::min(share, 1 - share) / kFlatEnd);
-    const double out =
-        amplitude * end * end * (3 - 2 * end) * (1 - std::cos(2 * std::numbers::pi * kPleats * share));
+    const double out = amplitude * end * end * (3 - 2 * end) * (1 - std::cos(2 * std::numbers::pi * kPleats * share));
     const double left = (kHalfWidth + out) * std::sin(angle);
     const double back = kBehindNeck + (kHalfDepth + out) * std::cos(angle);
     fine.push_back(dropped(s, settings.thickness, s.neck + left * s.left - back * s.forward));

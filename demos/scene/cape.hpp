@@ -15,9 +15,9 @@ struct CapeSettings {
 };
 
 struct Cape {
-  softbody::Cloth cloth;          ///< positions in world coordinates at time t0
-  std::vector<Index> pins;        ///< along the shoulders and the neck
-  human::Attachment attachment;   ///< of the pins, in the order of `pins`
+  softbody::Cloth cloth;         ///< positions in world coordinates at time t0
+  std::vector<Index> pins;       ///< along the shoulders and the neck
+  human::Attachment attachment;  ///< of the pins, in the order of `pins`
 };
 
 /// @throws std::invalid_argument for settings that make no cloth

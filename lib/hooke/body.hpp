@@ -96,8 +96,8 @@ class Body {
   /// Displacement since creation of a point, or of the centre of mass [m].
   Vec3 displacement(Index point) const;
   Vec3 displacement() const;
-  double speed(Index point) const;                            ///< [m/s]
-  double weight(Index point, const Vec3& gravity) const;      ///< [N] = mass × |gravity|
+  double speed(Index point) const;                        ///< [m/s]
+  double weight(Index point, const Vec3& gravity) const;  ///< [N] = mass × |gravity|
 
   // What the world calls, in this order.
   /// A frame begins: forces added so far become an impulse bank of `seconds`; `waiting` seconds of

@@ -19,7 +19,7 @@ class Clock {
       throw std::invalid_argument("Clock: tick_rate must be positive, got " + std::to_string(tick_rate) + " 1/s");
   }
 
-  double tick() const { return 1 / tick_rate_; }  ///< length of a tick [s]
+  double tick() const { return 1 / tick_rate_; }   ///< length of a tick [s]
   double tick_rate() const { return tick_rate_; }  ///< [1/s]
   std::int64_t ticks() const { return ticks_; }    ///< ticks done since the start
   double time() const { return time_at(ticks_); }  ///< [s] since the start

@@ -26,8 +26,7 @@ class Contacts {
   bool any() const { return !candidates_.empty() || !callbacks_.empty(); }
 
   /// Resolves contacts after a move from `from` at t0 to x at t1.
-  void resolve(double t0, const Points<S>& from, double t1, const Values<S>& inverse_mass, Points<S>& x,
-               Points<S>& v);
+  void resolve(double t0, const Points<S>& from, double t1, const Values<S>& inverse_mass, Points<S>& x, Points<S>& v);
 
   /// Takes from v what presses into the surfaces touched by the last `resolve`, and rubs: for
   /// methods that end with a kick, which knows nothing of contacts.
@@ -47,7 +46,7 @@ class Contacts {
     S friction = 0, restitution = 0;
   };
   struct Surface {
-    S gap;      // distance to the thickened surface
+    S gap;  // distance to the thickened surface
     Vec normal;
   };
   struct Candidate {

@@ -82,8 +82,8 @@ typename ForceField<S>::Rates QuadraticDrag<S>::rate_bounds(const Points<S>&, co
                                                             const Values<S>& inverse_mass) const {
   double gamma = 0;
   for (Index i = 0; i < v.rows(); ++i)
-    gamma = std::max(gamma, 2 * double(coefficient_) * double(inverse_mass[i]) *
-                                v.row(i).matrix().template cast<double>().norm());
+    gamma = std::max(
+        gamma, 2 * double(coefficient_) * double(inverse_mass[i]) * v.row(i).matrix().template cast<double>().norm());
   return {0, gamma};
 }
 

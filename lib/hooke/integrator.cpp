@@ -133,7 +133,8 @@ SolveResult Integrator<S>::run(const RungeKutta& table, Dynamics<S>& dynamics, P
 
 // (M + h²K + hD) solution = right on the free points, by conjugate gradients with M as
 // preconditioner: errors count as velocities, so light points next to heavy ones are solved
-// as well as those. Returns false where the matrix shows a direction of negative curvature (only possible without `safe`).
+// as well as those. Returns false where the matrix shows a direction of negative curvature (only possible without
+// `safe`).
 template <class S>
 bool Integrator<S>::solve_linear(Dynamics<S>& dynamics, S h, bool safe, double tolerance, const Points<S>& x,
                                  const Points<S>& v, const Points<S>& right, Points<S>& solution) {
@@ -194,8 +195,7 @@ double Integrator<S>::rounding_of_force(Dynamics<S>& dynamics, S h) {
 template <class S>
 SolveResult Integrator<S>::run(const Implicit& scheme, Dynamics<S>& dynamics, Points<S>& x, Points<S>& v, double t,
                                double h) {
-  const double tolerance =
-      scheme.tolerance > 0 ? scheme.tolerance : (std::is_same_v<S, float> ? 1e-6 : 1e-12);
+  const double tolerance = scheme.tolerance > 0 ? scheme.tolerance : (std::is_same_v<S, float> ? 1e-6 : 1e-12);
   const Values<S>& mass = dynamics.mass();
   const Values<S>& inverse_mass = dynamics.inverse_mass();
   const S step = S(h);

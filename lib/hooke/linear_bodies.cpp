@@ -53,7 +53,8 @@ double falling_root(double f, double g, double a, double end) {
       const double root = std::sqrt(discriminant);
       if (a < 0) s = (g + root) / -a;
       // The same root for a > 0, without cancellation.
-      else if (g < 0) s = 2 * f / (-g + root);
+      else if (g < 0)
+        s = 2 * f / (-g + root);
     }
   }
   // What already is a rounding error below falls through at once.

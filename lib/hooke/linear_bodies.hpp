@@ -26,11 +26,11 @@ struct LinearBody {
 
 /// One impact of the last tick.
 struct Impact {
-  double time = 0;       ///< [s]
+  double time = 0;  ///< [s]
   Index body = 0;
-  Index other = -1;      ///< another body, or -1: a collider
-  Vec3 impulse{0, 0, 0}; ///< on `body` [kg m/s]; the other gets the opposite
-  double approach = 0;   ///< speed at which they met [m/s], >= 0
+  Index other = -1;       ///< another body, or -1: a collider
+  Vec3 impulse{0, 0, 0};  ///< on `body` [kg m/s]; the other gets the opposite
+  double approach = 0;    ///< speed at which they met [m/s], >= 0
 };
 
 /// A set of linear rigid bodies that meet each other and the world's static half-spaces.
@@ -68,7 +68,7 @@ class LinearBodies final : public PointBody<S> {
   };
   struct Event {
     double when;
-    Index body, other;      // other: a body, or -1
+    Index body, other;  // other: a body, or -1
     std::size_t collider;
   };
 

@@ -44,15 +44,19 @@ const Method& rk2() {
 }
 
 const Method& rk4() {
-  static const Method method{
-      "rk4", 4, false, 2 * std::sqrt(2.0), 4, true,
-      RungeKutta{{{}, {0.5}, {0, 0.5}, {0, 0, 1}}, {1.0 / 6, 1.0 / 3, 1.0 / 3, 1.0 / 6}}};
+  static const Method method{"rk4",
+                             4,
+                             false,
+                             2 * std::sqrt(2.0),
+                             4,
+                             true,
+                             RungeKutta{{{}, {0.5}, {0, 0.5}, {0, 0, 1}}, {1.0 / 6, 1.0 / 3, 1.0 / 3, 1.0 / 6}}};
   return method;
 }
 
 std::span<const Method* const> methods() {
-  static const std::array<const Method*, 7> all{&explicit_euler(),  &semi_implicit_euler(), &implicit_euler(), &verlet(),
-                                                &velocity_verlet(), &rk2(),                 &rk4()};
+  static const std::array<const Method*, 7> all{
+      &explicit_euler(), &semi_implicit_euler(), &implicit_euler(), &verlet(), &velocity_verlet(), &rk2(), &rk4()};
   return all;
 }
 

@@ -37,12 +37,12 @@ struct Implicit {
 
 /// One integration method and what is known about it.
 struct Method {
-  std::string_view name;             ///< as in scene files
-  int order;                         ///< of the global position error, as dt → 0
-  bool symplectic;                   ///< keeps the energy of undamped motion bounded
-  double stability_limit;            ///< largest stable dt·ω undamped; 0: none; infinity: always
-  int evaluations;                   ///< of the forces per step
-  bool accepts_velocity_forces;      ///< drag and dampers allowed
+  std::string_view name;         ///< as in scene files
+  int order;                     ///< of the global position error, as dt → 0
+  bool symplectic;               ///< keeps the energy of undamped motion bounded
+  double stability_limit;        ///< largest stable dt·ω undamped; 0: none; infinity: always
+  int evaluations;               ///< of the forces per step
+  bool accepts_velocity_forces;  ///< drag and dampers allowed
   std::variant<Splitting, Verlet, RungeKutta, Implicit> scheme;
 };
 

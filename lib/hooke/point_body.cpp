@@ -28,7 +28,9 @@ void check_finite(const Vec3& value, const char* what) {
 template <class S>
 PointBody<S>::PointBody(std::string name, PointMasses<S> points, MotionSettings settings)
     : Body(std::move(name)), points_(std::move(points)), settings_(settings), integrator_(*settings.method) {
-  const auto fail = [&](const std::string& rule) { throw std::invalid_argument("body \"" + this->name() + "\": " + rule); };
+  const auto fail = [&](const std::string& rule) {
+    throw std::invalid_argument("body \"" + this->name() + "\": " + rule);
+  };
   const Index n = points_.size();
   if (points_.velocity.rows() != n || points_.mass.size() != n || points_.inverse_mass.size() != n)
     fail("position, velocity, mass and inverse_mass must have the same length");
@@ -369,7 +371,7 @@ StepReport PointBody<S>::explain(bool finite) {
     return report;
   }
   const double stable = stable_step();
-  const std::string limit = stable == 0               ? "0 (none undamped)"
+  const std::string limit = stable == 0             ? "0 (none undamped)"
                             : std::isfinite(stable) ? std::to_string(1e3 * stable) + " ms"
                                                     : "without bound";
   report.advice = "the substep was " + std::to_string(1e3 * (tick_.end - tick_.start) / double(substeps_)) +

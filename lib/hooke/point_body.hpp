@@ -16,9 +16,9 @@ namespace hooke {
 /// How a body is moved.
 struct MotionSettings {
   const Method* method = &velocity_verlet();
-  double dt = 0;         ///< wanted substep [s]; 0: from the largest stable step
-  double thickness = 0;  ///< distance kept from colliders [m]
-  bool collides = true;  ///< false: colliders are ignored
+  double dt = 0;                   ///< wanted substep [s]; 0: from the largest stable step
+  double thickness = 0;            ///< distance kept from colliders [m]
+  bool collides = true;            ///< false: colliders are ignored
   Index max_substeps = 1'000'000;  ///< a tick; the automatic step stops there
 };
 
@@ -127,7 +127,7 @@ class PointBody : public Body, protected Dynamics<S> {
 
   // While a failed tick is run once more to find out what went wrong.
   bool watching_ = false;
-  Index culprit_ = -1;          // the first point with a force or place that is not finite
+  Index culprit_ = -1;            // the first point with a force or place that is not finite
   bool fields_at_fault_ = false;  // its force came from ordinary positions and velocities
 };
 

@@ -18,7 +18,8 @@ Body* World::find(const std::string& name) const {
 }
 
 void World::add_collider(Collider collider) {
-  if (!(collider.friction >= 0)) throw std::invalid_argument("collider \"" + collider.name + "\": friction must not be negative");
+  if (!(collider.friction >= 0))
+    throw std::invalid_argument("collider \"" + collider.name + "\": friction must not be negative");
   if (!(collider.restitution >= 0 && collider.restitution <= 1))
     throw std::invalid_argument("collider \"" + collider.name + "\": restitution must be in [0, 1]");
   colliders_.push_back(std::move(collider));

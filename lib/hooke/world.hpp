@@ -36,7 +36,7 @@ class World {
   void add_collider(Collider collider);
   const std::vector<Collider>& colliders() const { return colliders_; }
 
-  void set_gravity(const Vec3& gravity);            ///< [m/s²]
+  void set_gravity(const Vec3& gravity);  ///< [m/s²]
   void enable_gravity(bool on) { gravity_on_ = on; }
   Vec3 gravity() const { return gravity_on_ ? gravity_ : Vec3(Vec3::Zero()); }
 

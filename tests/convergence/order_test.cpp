@@ -29,17 +29,19 @@ Problem oscillator() {
 
 /// The tutorial's ship: 10 m/s² at 1 s, 25 m/s² at 2 s.
 Problem ship() {
-  return {"ship", 1, 2, [](const Method& method, double dt) {
-            auto body = body_of(point<double>({0, 0, 0}, {3, 0, 0}), motion(method, dt));
-            body->add_field(std::make_unique<TimeForce<double>>([](double t) { return Vec3(10 + 15 * (t - 1), 0, 0); }));
-            return body;
-          }};
+  return {
+      "ship", 1, 2, [](const Method& method, double dt) {
+        auto body = body_of(point<double>({0, 0, 0}, {3, 0, 0}), motion(method, dt));
+        body->add_field(std::make_unique<TimeForce<double>>([](double t) { return Vec3(10 + 15 * (t - 1), 0, 0); }));
+        return body;
+      }};
 }
 
 /// A spring pendulum of stiffness 20 N/m in a gravity of 1 m/s²: nonlinear in two dimensions.
 Problem pendulum() {
   return {"pendulum", 0, 2, [](const Method& method, double dt) {
-            auto masses = points<double>(rows({{0, 0, 0}, {1, 0, 0}}), rows({{0, 0, 0}, {0, 0.2, 0}}), Values<double>::Ones(2));
+            auto masses =
+                points<double>(rows({{0, 0, 0}, {1, 0, 0}}), rows({{0, 0, 0}, {0, 0.2, 0}}), Values<double>::Ones(2));
             auto body = body_of(std::move(masses), motion(method, dt));
             body->pin(0);
             auto network = std::make_shared<softbody::SpringNetwork>();
@@ -62,14 +64,15 @@ Problem drag() {
 
 /// A driven, damped, hardening spring: position, velocity and time at once.
 Problem duffing() {
-  return {"driven hardening spring with drag", 0, 2, [](const Method& method, double dt) {
-            auto body = body_of(point<double>({1, 0.2, 0}, {0, 0.7, 0.1}), motion(method, dt));
-            body->add_field(std::make_unique<Anchor<double>>(2, 1.5));
-            body->add_field(std::make_unique<QuadraticDrag<double>>(0.4));
-            body->add_field(std::make_unique<LinearDrag<double>>(0.2));
-            body->add_field(std::make_unique<TimeForce<double>>([](double t) { return Vec3(std::cos(3 * t), 0.5, 0); }));
-            return body;
-          }};
+  return {
+      "driven hardening spring with drag", 0, 2, [](const Method& method, double dt) {
+        auto body = body_of(point<double>({1, 0.2, 0}, {0, 0.7, 0.1}), motion(method, dt));
+        body->add_field(std::make_unique<Anchor<double>>(2, 1.5));
+        body->add_field(std::make_unique<QuadraticDrag<double>>(0.4));
+        body->add_field(std::make_unique<LinearDrag<double>>(0.2));
+        body->add_field(std::make_unique<TimeForce<double>>([](double t) { return Vec3(std::cos(3 * t), 0.5, 0); }));
+        return body;
+      }};
 }
 
 Vec3 end_of(const Problem& problem, const Method& method, int steps) {
@@ -117,12 +120,11 @@ TEST_P(OrderOf, IsTheDeclaredOneOnBothSides) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(Every, OrderOf, ::testing::ValuesIn(methods().begin(), methods().end()),
-                         [](const auto& test) {
-                           std::string name(test.param->name);
-                           std::erase(name, '-');
-                           return name;
-                         });
+INSTANTIATE_TEST_SUITE_P(Every, OrderOf, ::testing::ValuesIn(methods().begin(), methods().end()), [](const auto& test) {
+  std::string name(test.param->name);
+  std::erase(name, '-');
+  return name;
+});
 
 TEST(Order, Rk4IsExactForTheShip) {
   // x(2) = 3 + ∫∫ (10 + 15 s) = 3 + 5 + 2.5
@@ -131,7 +133,9 @@ TEST(Order, Rk4IsExactForTheShip) {
 
 TEST(Order, TheShipsErrorFallsAsTheTutorialWantsToSee) {
   const double exact = 10.5;
-  const auto error = [&](const Method& method, int steps) { return std::abs(end_of(ship(), method, steps).x() - exact); };
+  const auto error = [&](const Method& method, int steps) {
+    return std::abs(end_of(ship(), method, steps).x() - exact);
+  };
   for (const Method* method : methods()) {
     if (method == &rk4()) continue;
     SCOPED_TRACE(method->name);

@@ -106,7 +106,8 @@ TEST(StabilityLimit, IsWhereTheMethodsSaySharpOnBothSides) {
 // A point on a damped spring to a pinned point, along the spring: x'' = -ω²x - 2ζωx', ω = 1.
 // Ticks are long: taking the acceleration anew at their start calms the predicted velocities.
 bool damped_spring_bounded(const Method& method, double phase, double zeta) {
-  auto masses = points<double>(rows({{0, 0, 0}, {10.5, 0, 0}}), rows({Vec3::Zero(), Vec3::Zero()}), Values<double>::Ones(2));
+  auto masses =
+      points<double>(rows({{0, 0, 0}, {10.5, 0, 0}}), rows({Vec3::Zero(), Vec3::Zero()}), Values<double>::Ones(2));
   auto body = body_of(std::move(masses), motion(method, phase));
   body->pin(0);
   auto network = std::make_shared<softbody::SpringNetwork>();
@@ -140,7 +141,8 @@ TEST(StabilityLimit, OfADampedSpringIsTheClosedForm) {
 TEST(LargestStableStep, NeverPromisesAnUnstableStep) {
   for (const Method* method : methods()) {
     if (method == &implicit_euler()) continue;
-    for (const double zeta : {0.0, 0.01, 0.1, 0.3, 0.31, 0.4, 0.5, 0.55, 0.6, 0.7, 0.71, 0.9, 1.0, 1.1, 1.5, 2.0, 3.0, 5.0}) {
+    for (const double zeta :
+         {0.0, 0.01, 0.1, 0.3, 0.31, 0.4, 0.5, 0.55, 0.6, 0.7, 0.71, 0.9, 1.0, 1.1, 1.5, 2.0, 3.0, 5.0}) {
       const double promised = largest_stable_step(*method, 1, 2 * zeta);
       if (promised == 0) continue;  // none promised
       for (const int steps_per_tick : {1, 2, 10}) {

@@ -104,7 +104,8 @@ TEST(HangingCloth, WithoutShearStretchesByHalfItsWeightAtAnyResolution) {
     SCOPED_TRACE(rows_count);
     const auto cloth = softbody::cloth_from_grid(width, height, 3, rows_count, Vec3::UnitX(), -Vec3::UnitY(), material);
     const Index n = cloth.positions.rows();
-    auto body = body_of(points<double>(cloth.positions, Points<double>::Zero(n, 3), cloth.masses), motion(implicit_euler(), 1));
+    auto body =
+        body_of(points<double>(cloth.positions, Points<double>::Zero(n, 3), cloth.masses), motion(implicit_euler(), 1));
     for (Index i = 0; i < 3; ++i) body->pin(i);
     give_springs(*body, *cloth.network);
     ASSERT_TRUE(run(*body, 1, 100, kGravity).good());
@@ -114,10 +115,10 @@ TEST(HangingCloth, WithoutShearStretchesByHalfItsWeightAtAnyResolution) {
 
 // Two points of 1 kg that circle each other at ω = 2 on a spring of 100 N/m and 1 m.
 std::unique_ptr<PointBody<double>> orbit(const Method& method, double dt, double length, double omega) {
-  auto body = body_of(points<double>(rows({{-length / 2, 0, 0}, {length / 2, 0, 0}}),
-                                     rows({{0, -omega * length / 2, 0}, {0, omega * length / 2, 0}}),
-                                     Values<double>::Ones(2)),
-                      motion(method, dt));
+  auto body =
+      body_of(points<double>(rows({{-length / 2, 0, 0}, {length / 2, 0, 0}}),
+                             rows({{0, -omega * length / 2, 0}, {0, omega * length / 2, 0}}), Values<double>::Ones(2)),
+              motion(method, dt));
   SpringNetwork network;
   network.springs.push_back({0, 1, 100, 0, 1, Family::Raw});
   give_springs(*body, std::move(network));
@@ -207,7 +208,8 @@ TEST(String, VibratesAcrossAtItsFrequencies) {
     }
     x(n + 1, 1) = 0;
     for (int i = 0; i <= n; ++i) network.springs.push_back({i, i + 1, 2, 0, 0.5, Family::Raw});
-    auto body = body_of(points<double>(x, Points<double>::Zero(n + 2, 3), Values<double>::Ones(n + 2)), motion(rk4(), 0.01));
+    auto body =
+        body_of(points<double>(x, Points<double>::Zero(n + 2, 3), Values<double>::Ones(n + 2)), motion(rk4(), 0.01));
     body->pin(0), body->pin(n + 1);
     give_springs(*body, std::move(network));
     EXPECT_NEAR(frequency(*body, 2, 1, 0, 0.01, 50, 40), known[mode - 1], 1e-9);
@@ -222,7 +224,8 @@ TEST(String, VibratesAlongAtTheStiffnessInPlaceOfTheTension) {
   for (int i = 0; i < n + 2; ++i) x(i, 0) = i + 1e-5 * std::sin(std::numbers::pi * i / (n + 1));
   x(n + 1, 0) = n + 1;
   for (int i = 0; i <= n; ++i) network.springs.push_back({i, i + 1, k, 0, 0.5, Family::Raw});
-  auto body = body_of(points<double>(x, Points<double>::Zero(n + 2, 3), Values<double>::Ones(n + 2)), motion(rk4(), 0.01));
+  auto body =
+      body_of(points<double>(x, Points<double>::Zero(n + 2, 3), Values<double>::Ones(n + 2)), motion(rk4(), 0.01));
   body->pin(0), body->pin(n + 1);
   give_springs(*body, std::move(network));
   EXPECT_NEAR(frequency(*body, 5, 0, 5, 0.01, 50, 40), 2 * std::sqrt(k) * std::sin(std::numbers::pi / 20), 1e-9);
@@ -251,8 +254,9 @@ TEST(Membrane, VibratesAtItsFirstFrequency) {
 
 // x'' = -xλ, y'' = -yλ - 1 from (1, 0) at rest, k = 1000.
 TEST(StiffPendulum, AgreesWithTheLiteratureToTenDigits) {
-  auto body = body_of(points<double>(rows({{0, 0, 0}, {1, 0, 0}}), rows({Vec3::Zero(), Vec3::Zero()}), Values<double>::Ones(2)),
-                      motion(rk4(), 1e-4));
+  auto body =
+      body_of(points<double>(rows({{0, 0, 0}, {1, 0, 0}}), rows({Vec3::Zero(), Vec3::Zero()}), Values<double>::Ones(2)),
+              motion(rk4(), 1e-4));
   body->pin(0);
   SpringNetwork network;
   network.springs.push_back({0, 1, 1000, 0, 1, Family::Raw});

@@ -112,8 +112,8 @@ TEST(LinearBodies, ImpulsesAreEqualAndOppositeAndAnImmovableBodyNeverMoves) {
   world.enable_gravity(false);
   LinearBody wall = ball(0.5, 10, {1, 0, 0}, {0, 0, 0}, 1);
   wall.reacts = false;
-  auto& bodies = world.add(std::make_unique<LinearBodies<double>>(
-      "two", std::vector{ball(0.1, 2, {0, 0, 0}, {3, 0, 0}, 1), wall}));
+  auto& bodies = world.add(
+      std::make_unique<LinearBodies<double>>("two", std::vector{ball(0.1, 2, {0, 0, 0}, {3, 0, 0}, 1), wall}));
   Vec3 impulse = Vec3::Zero();
   for (int i = 0; i < 240; ++i) {
     ASSERT_TRUE(world.update(1.0 / 240).good());
@@ -130,8 +130,8 @@ TEST(LinearBodies, WhatIsNotCollidableIsPassedThrough) {
   world.enable_gravity(false);
   LinearBody ghost = ball(0.5, 1, {1, 0, 0}, {0, 0, 0}, 1);
   ghost.collidable = false;
-  auto& bodies =
-      world.add(std::make_unique<LinearBodies<double>>("two", std::vector{ball(0.1, 1, {0, 0, 0}, {3, 0, 0}, 1), ghost}));
+  auto& bodies = world.add(
+      std::make_unique<LinearBodies<double>>("two", std::vector{ball(0.1, 1, {0, 0, 0}, {3, 0, 0}, 1), ghost}));
   ASSERT_TRUE(world.update(1).good());
   EXPECT_NEAR(bodies.positions()(0, 0), 3, 1e-12);
   EXPECT_EQ(bodies.positions()(1, 0), 1.0);

@@ -16,7 +16,8 @@ std::unique_ptr<PointBody<S>> chain(const MotionSettings& settings, int n, doubl
   Points<double> x = Points<double>::Zero(n, 3);
   softbody::SpringNetwork network;
   for (int i = 0; i < n; ++i) x(i, 0) = 0.1 * i;
-  for (int i = 0; i + 1 < n; ++i) network.springs.push_back({i, i + 1, stiffness, damping, softbody::Spring::kFromStart});
+  for (int i = 0; i + 1 < n; ++i)
+    network.springs.push_back({i, i + 1, stiffness, damping, softbody::Spring::kFromStart});
   auto body = body_of(points<S>(x, Points<double>::Zero(n, 3), Values<double>::Constant(n, 0.05)), settings, "chain");
   body->pin(0);
   body->add_field(std::make_unique<softbody::SpringField<S>>(std::make_shared<const softbody::SpringNetwork>(network),

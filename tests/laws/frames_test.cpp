@@ -15,7 +15,8 @@ TEST(GlobalDamping, LosesItsShareEachSecondAtAnyFrameAndTickRate) {
   for (const Method* method : methods())
     for (const double tick_rate : {60.0, 240.0, 1000.0})
       for (const double frame_rate : {30.0, 60.0}) {
-        SCOPED_TRACE(std::string(method->name) + " at " + std::to_string(tick_rate) + "/s in frames of " + std::to_string(frame_rate) + "/s");
+        SCOPED_TRACE(std::string(method->name) + " at " + std::to_string(tick_rate) + "/s in frames of " +
+                     std::to_string(frame_rate) + "/s");
         World world(tick_rate);
         world.enable_gravity(false);
         world.set_damping(0.3);
@@ -63,7 +64,8 @@ TEST(Push, OfOneSecondMovesAMassTheSameAtAnyFrameRate) {
       world.enable_gravity(false);
       Values<double> mass(1);
       mass << 2.5;
-      auto& body = world.add(body_of(points<double>(Points<double>::Zero(1, 3), Points<double>::Zero(1, 3), mass), motion(*method)));
+      auto& body = world.add(
+          body_of(points<double>(Points<double>::Zero(1, 3), Points<double>::Zero(1, 3), mass), motion(*method)));
       for (int frame = 0; frame < frame_rate; ++frame) {
         body.add_force(0, {7, -2, 1});
         ASSERT_TRUE(world.update(1 / frame_rate).good());
@@ -143,9 +145,7 @@ std::unique_ptr<World> windy_scene(softbody::Precision precision) {
     p.row(1) << 0.3, 0.1 * std::sin(3 * t), 0.05 * (1 - std::cos(t));
   });
   Collider ball{"ball", {Sphere{}}, {}, {}, 0.3, 0};
-  ball.motion = [](double t, std::span<Shape> shapes) {
-    shapes[0] = Sphere{{0, -0.4, 0.5 * std::cos(2 * t)}, 0.15};
-  };
+  ball.motion = [](double t, std::span<Shape> shapes) { shapes[0] = Sphere{{0, -0.4, 0.5 * std::cos(2 * t)}, 0.15}; };
   world->add_collider(ball);
   return world;
 }

@@ -24,7 +24,8 @@ TYPED_TEST(Momentum, IsKeptByAnyNetworkWithAndWithoutDamping) {
     auto network = std::make_shared<softbody::SpringNetwork>();
     for (int i = 0; i < 120; ++i) {
       const int a = random.below(int(n)), b = (a + 1 + random.below(int(n) - 1)) % int(n);
-      network->springs.push_back({a, b, random.uniform(1, 200), damped ? random.uniform(0, 2) : 0, random.uniform(0, 2)});
+      network->springs.push_back(
+          {a, b, random.uniform(1, 200), damped ? random.uniform(0, 2) : 0, random.uniform(0, 2)});
     }
     for (const Method* method : methods()) {
       SCOPED_TRACE(std::string(method->name) + (damped ? ", damped" : ", undamped"));
@@ -50,7 +51,8 @@ TEST(Force, AcceleratesByTheInverseMass) {
     world.enable_gravity(false);
     Values<double> mass(2);
     mass << 2, 5;
-    auto& body = world.add(body_of(points<double>(Points<double>::Zero(2, 3), Points<double>::Zero(2, 3), mass), motion(*method)));
+    auto& body = world.add(
+        body_of(points<double>(Points<double>::Zero(2, 3), Points<double>::Zero(2, 3), mass), motion(*method)));
     for (int frame = 0; frame < 60; ++frame) {
       body.add_force(0, {3, 0, 0});
       body.add_force(1, {0, 3, 0});

@@ -17,8 +17,9 @@ bool is_at(const PointBody<S>& body, Index point, const Vec3& x) {
 // Two points on a spring; the first is pinned.
 template <class S>
 std::unique_ptr<PointBody<S>> pair(const Method& method) {
-  auto body = body_of(points<S>(rows({{0, 0, 0}, {0, -0.5, 0}}), Points<double>::Zero(2, 3), Values<double>::Constant(2, 0.7)),
-                      motion(method));
+  auto body =
+      body_of(points<S>(rows({{0, 0, 0}, {0, -0.5, 0}}), Points<double>::Zero(2, 3), Values<double>::Constant(2, 0.7)),
+              motion(method));
   auto network = std::make_shared<softbody::SpringNetwork>();
   network->springs.push_back({0, 1, 200, 1, 0.5, softbody::Family::Raw});
   body->add_field(std::make_unique<softbody::SpringField<S>>(network, body->state().position));
@@ -101,7 +102,8 @@ TYPED_TEST(Pin, ReleasedFallsWithTheMassItHad) {
   for (const Method* method : methods()) {
     SCOPED_TRACE(method->name);
     World world(240);
-    auto& body = world.add(body_of(points<S>(rows({{0, 0, 0}}), rows({{0, 0, 0}}), Values<double>::Constant(1, 0.7)), motion(*method)));
+    auto& body = world.add(
+        body_of(points<S>(rows({{0, 0, 0}}), rows({{0, 0, 0}}), Values<double>::Constant(1, 0.7)), motion(*method)));
     body.pin(0);
     EXPECT_TRUE(body.pinned(0));
     EXPECT_NEAR(body.masses()[0], 0.7, 1e-7);
@@ -133,7 +135,9 @@ TYPED_TEST(Pin, JumpThatIsDeclaredAddsNoVelocity) {
     SCOPED_TRACE(method->name);
     World world(240);
     world.enable_gravity(false);
-    auto& body = world.add(body_of(points<S>(rows({{0, 0, 0}, {1, 0, 0}}), rows({{2, 0, 0}, {0, 0, 0}}), Values<double>::Ones(2)), motion(*method)));
+    auto& body = world.add(
+        body_of(points<S>(rows({{0, 0, 0}, {1, 0, 0}}), rows({{2, 0, 0}, {0, 0, 0}}), Values<double>::Ones(2)),
+                motion(*method)));
     body.pin(1);
     ASSERT_TRUE(world.update(0.1).good());
     const double before = body.energy(Vec3::Zero()).total();

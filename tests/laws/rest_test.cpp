@@ -116,9 +116,9 @@ TYPED_TEST(Rest, OfAnImmovablePointIsBrokenByNothing) {
     SCOPED_TRACE(method->name);
     World world(120);
     world.set_damping(0.3);
-    auto& body = world.add(body_of(points<S>(rows({{0, 0.1, 0}, {1, 0.2, 0}, {0.3, 1, 0.1}}), Points<double>::Zero(3, 3),
-                                             Values<double>::Ones(3)),
-                                   motion(*method)));
+    auto& body = world.add(body_of(
+        points<S>(rows({{0, 0.1, 0}, {1, 0.2, 0}, {0.3, 1, 0.1}}), Points<double>::Zero(3, 3), Values<double>::Ones(3)),
+        motion(*method)));
     auto network = std::make_shared<softbody::SpringNetwork>();
     network->springs = {{0, 1, 500, 1, 0.5}, {0, 2, 500, 1, 0.5}, {1, 2, 500, 1, 0.5}};
     body.add_field(std::make_unique<SpringField<S>>(network, body.state().position));

@@ -4,8 +4,8 @@
 #include <hooke/softbody/soft_body.hpp>
 #include <hooke/softbody/spring_field.hpp>
 
-#include <Eigen/Geometry>
 #include <gmock/gmock.h>
+#include <Eigen/Geometry>
 
 namespace hooke::test {
 namespace {
@@ -136,7 +136,8 @@ TEST(Cloth, DampsEachSpringByItsRatioOfCritical) {
   for (const auto& spring : cloth.network->springs) {
     const double ratio = spring.family == Family::Stretch ? 0.1 : spring.family == Family::Shear ? 0.2 : 0.3;
     EXPECT_NEAR(spring.damping,
-                softbody::damping_of_ratio(ratio, spring.stiffness, cloth.masses[spring.a], cloth.masses[spring.b]), 1e-12);
+                softbody::damping_of_ratio(ratio, spring.stiffness, cloth.masses[spring.a], cloth.masses[spring.b]),
+                1e-12);
   }
 }
 

@@ -24,7 +24,8 @@ SpringNetwork random_network(Random& random, int n, int springs, bool damped = f
   SpringNetwork network;
   for (int i = 0; i < springs; ++i) {
     const int a = random.below(n), b = (a + 1 + random.below(n - 1)) % n;
-    network.springs.push_back({a, b, random.uniform(1, 500), damped ? random.uniform(0, 3) : 0, random.uniform(0, 1.5)});
+    network.springs.push_back(
+        {a, b, random.uniform(1, 500), damped ? random.uniform(0, 3) : 0, random.uniform(0, 1.5)});
   }
   return network;
 }
@@ -88,7 +89,8 @@ TEST(SpringField, StiffnessIsTheSlopeOfTheForceAndTheSafeOneIsPositive) {
   const auto field = field_of(network, x);
   const double step = 1e-6;
   const auto differences = matrix_of(n, [&](const Points<double>& d, Points<double>& out) {
-    out = (force(field, Points<double>(x - step * d), none(n)) - force(field, Points<double>(x + step * d), none(n))) / (2 * step);
+    out = (force(field, Points<double>(x - step * d), none(n)) - force(field, Points<double>(x + step * d), none(n))) /
+          (2 * step);
   });
   const auto exact = matrix_of(n, [&](const auto& d, auto& out) { field.add_stiffness_times(x, d, false, out); });
   const auto safe = matrix_of(n, [&](const auto& d, auto& out) { field.add_stiffness_times(x, d, true, out); });
@@ -123,7 +125,8 @@ TYPED_TEST(Springs, PullTheSameInRunsAndShuffled) {
   std::iota(label.begin(), label.end(), 0);
   for (std::size_t i = label.size(); i-- > 1;) std::swap(label[i], label[std::size_t(random.below(int(i) + 1))]);
   SpringNetwork relabelled = *cloth.network;
-  for (Spring& spring : relabelled.springs) spring.a = label[std::size_t(spring.a)], spring.b = label[std::size_t(spring.b)];
+  for (Spring& spring : relabelled.springs)
+    spring.a = label[std::size_t(spring.a)], spring.b = label[std::size_t(spring.b)];
   Points<S> start2(n, 3), x2(n, 3), v2(n, 3);
   for (Index i = 0; i < n; ++i) {
     const Index j = label[std::size_t(i)];
@@ -137,7 +140,8 @@ TYPED_TEST(Springs, PullTheSameInRunsAndShuffled) {
     const Vec3 rest = (start.row(s.b) - start.row(s.a)).matrix().transpose().template cast<double>();
     const Vec3 u = (v.row(s.b) - v.row(s.a)).matrix().transpose().template cast<double>();
     const Vec3 pull = (s.stiffness * (d.norm() - rest.norm()) + s.damping * u.dot(d) / d.norm()) * d / d.norm();
-    naive.row(s.a) += pull.transpose().array().template cast<S>(), naive.row(s.b) -= pull.transpose().array().template cast<S>();
+    naive.row(s.a) += pull.transpose().array().template cast<S>(),
+        naive.row(s.b) -= pull.transpose().array().template cast<S>();
   }
   const double tolerance = 200 * kUnit<S> * double(one.abs().maxCoeff()) + (std::is_same_v<S, float> ? 1e-3 : 0);
   for (Index i = 0; i < n; ++i) {
@@ -180,7 +184,8 @@ TYPED_TEST(Springs, ThatCollapseIntoOnePointStayFinite) {
   }
 }
 
-double true_largest(const SpringField<double>& field, const Points<double>& x, const Values<double>& w, bool of_damping) {
+double true_largest(const SpringField<double>& field, const Points<double>& x, const Values<double>& w,
+                    bool of_damping) {
   const Index n = x.rows();
   Eigen::MatrixXd k = matrix_of(n, [&](const auto& d, auto& out) {
     if (of_damping)
@@ -258,7 +263,9 @@ TEST(SpringNetwork, RefusesBadSprings) {
 
 TEST(SpringNetwork, TellsRestLengthsAndStrains) {
   SpringNetwork network;
-  network.springs = {{0, 1, 1, 0, Spring::kFromStart, Family::Stretch}, {1, 2, 1, 0, 4, Family::Bend}, {0, 2, 1, 0, 1, Family::Stretch}};
+  network.springs = {{0, 1, 1, 0, Spring::kFromStart, Family::Stretch},
+                     {1, 2, 1, 0, 4, Family::Bend},
+                     {0, 2, 1, 0, 1, Family::Stretch}};
   const Points<double> x = rows({{0, 0, 0}, {2, 0, 0}, {2, 5, 0}});
   const auto rest = softbody::rest_lengths(network, x);
   EXPECT_EQ(rest[0], 2);
@@ -278,7 +285,8 @@ TEST(SpringNetwork, DampingOfRatioOneIsCritical) {
     auto body = body_of(points<double>(rows({{0, 0, 0}, {1.1, 0, 0}}), none(2), mass), motion(rk4(), 1e-3));
     SpringNetwork network;
     network.springs.push_back({0, 1, k, softbody::damping_of_ratio(ratio, k, ma, mb), 1});
-    body->add_field(std::make_unique<SpringField<double>>(std::make_shared<const SpringNetwork>(network), body->state().position));
+    body->add_field(
+        std::make_unique<SpringField<double>>(std::make_shared<const SpringNetwork>(network), body->state().position));
     int count = 0;
     double before = 0.1;
     for (int i = 0; i < 2000; ++i) {

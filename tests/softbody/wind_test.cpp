@@ -72,8 +72,10 @@ TYPED_TEST(Air, PushesBothSidesTheSame) {
   auto front = plate(0.5), back = front;
   for (Triangle& t : back.triangles) std::swap(t[1], t[2]);
   const Vec3 wind{1, 2, 4};
-  EXPECT_LT((total<TypeParam>(steady(wind), front) - total<TypeParam>(steady(wind), back)).norm(), this->kTolerance * 10);
-  EXPECT_LT((total<TypeParam>(steady(wind), front) + total<TypeParam>(steady(-wind), front)).norm(), this->kTolerance * 10);
+  EXPECT_LT((total<TypeParam>(steady(wind), front) - total<TypeParam>(steady(wind), back)).norm(),
+            this->kTolerance * 10);
+  EXPECT_LT((total<TypeParam>(steady(wind), front) + total<TypeParam>(steady(-wind), front)).norm(),
+            this->kTolerance * 10);
 }
 
 TYPED_TEST(Air, OnlyKnowsTheRelativeVelocity) {
@@ -105,7 +107,8 @@ TYPED_TEST(Air, IsTheSameInRunsAndOneByOne) {
   SCOPED_TRACE(random.trace());
   const auto cloth = plate(0, 17);
   const Index n = cloth.positions.rows();
-  const Points<S> x = (cloth.positions + random.points(n, 0.05)).template cast<S>(), v = random.points(n, 2).template cast<S>();
+  const Points<S> x = (cloth.positions + random.points(n, 0.05)).template cast<S>(),
+                  v = random.points(n, 2).template cast<S>();
   Points<S> together = Points<S>::Zero(n, 3), apart = together;
   WindField<S>(steady({1, 2, 3}), cloth.triangles, n).add_force(x, v, 0, together);
   for (const Triangle& t : cloth.triangles) WindField<S>(steady({1, 2, 3}), {t}, n).add_force(x, v, 0, apart);

@@ -33,9 +33,11 @@ class Weaver {
   void join(int a, int b, double stiffness, Family family) {
     if (stiffness <= 0) return;
     const DampingRatios& ratios = material_.damping_ratio;
-    const double ratio = family == Family::Stretch ? ratios.stretch : family == Family::Shear ? ratios.shear : ratios.bend;
-    network_.springs.push_back({a, b, stiffness, damping_of_ratio(ratio, stiffness, masses_[a], masses_[b]),
-                                Spring::kFromStart, family});
+    const double ratio = family == Family::Stretch ? ratios.stretch
+                         : family == Family::Shear ? ratios.shear
+                                                   : ratios.bend;
+    network_.springs.push_back(
+        {a, b, stiffness, damping_of_ratio(ratio, stiffness, masses_[a], masses_[b]), Spring::kFromStart, family});
   }
   std::shared_ptr<const SpringNetwork> finish() { return std::make_shared<const SpringNetwork>(std::move(network_)); }
 

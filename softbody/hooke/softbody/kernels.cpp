@@ -81,8 +81,8 @@ HOOKE_INLINE void wind(WindBlock<S>& s) {
   S *fx = s.f[0], *fy = s.f[1], *fz = s.f[2];
   const S *x0 = s.x[0][0], *y0 = s.x[0][1], *z0 = s.x[0][2], *x1 = s.x[1][0], *y1 = s.x[1][1], *z1 = s.x[1][2],
           *x2 = s.x[2][0], *y2 = s.x[2][1], *z2 = s.x[2][2];
-  const S *vx0 = s.v[0][0], *vy0 = s.v[0][1], *vz0 = s.v[0][2], *vx1 = s.v[1][0], *vy1 = s.v[1][1],
-          *vz1 = s.v[1][2], *vx2 = s.v[2][0], *vy2 = s.v[2][1], *vz2 = s.v[2][2];
+  const S *vx0 = s.v[0][0], *vy0 = s.v[0][1], *vz0 = s.v[0][2], *vx1 = s.v[1][0], *vy1 = s.v[1][1], *vz1 = s.v[1][2],
+          *vx2 = s.v[2][0], *vy2 = s.v[2][1], *vz2 = s.v[2][2];
   const S wind_x = s.wind[0], wind_y = s.wind[1], wind_z = s.wind[2], drag = s.drag, lift = s.lift;
   const int n = s.n;
   HOOKE_INDEPENDENT

@@ -13,8 +13,8 @@ std::unique_ptr<Body> make(const SoftBodySettings& s) {
   const Index n = s.positions.rows();
   if (s.masses.size() != n || (s.velocities.rows() != 0 && s.velocities.rows() != n))
     throw std::invalid_argument("body \"" + s.name + "\": " + std::to_string(n) + " positions, " +
-                                std::to_string(s.masses.size()) + " masses and " +
-                                std::to_string(s.velocities.rows()) + " velocities do not fit together");
+                                std::to_string(s.masses.size()) + " masses and " + std::to_string(s.velocities.rows()) +
+                                " velocities do not fit together");
   PointMasses<S> points;
   points.origin = s.origin;
   points.position = s.positions.cast<S>();

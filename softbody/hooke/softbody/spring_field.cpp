@@ -83,7 +83,8 @@ SpringField<S>::SpringField(std::shared_ptr<const SpringNetwork> network, const 
     damped_ = damped_ || s.damping > 0;
     if (s.rest_length == Spring::kFromStart) {
       // The same operations in the same order as the kernel's.
-      const S dx = start(s.b, 0) - start(s.a, 0), dy = start(s.b, 1) - start(s.a, 1), dz = start(s.b, 2) - start(s.a, 2);
+      const S dx = start(s.b, 0) - start(s.a, 0), dy = start(s.b, 1) - start(s.a, 1),
+              dz = start(s.b, 2) - start(s.a, 2);
       rest_squared_[i] = dx * dx + dy * dy + dz * dz;
       rest_[i] = std::sqrt(rest_squared_[i]);
     } else {
@@ -151,8 +152,7 @@ void SpringField<S>::add_stiffness_times(const Points<S>& x, const Points<S>& d,
 }
 
 template <class S>
-void SpringField<S>::add_damping_times(const Points<S>& x, const Points<S>&, const Points<S>& d,
-                                       Points<S>& out) const {
+void SpringField<S>::add_damping_times(const Points<S>& x, const Points<S>&, const Points<S>& d, Points<S>& out) const {
   for (Index i = 0; i < size(); ++i) {
     if (damping_[i] == S(0)) continue;
     const int a = a_[std::size_t(i)], b = b_[std::size_t(i)];

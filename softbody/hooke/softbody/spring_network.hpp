@@ -17,10 +17,10 @@ enum class Family { Raw, Stretch, Shear, Bend };
 struct Spring {
   static constexpr double kFromStart = -1;
 
-  int a = 0, b = 0;                  ///< points, different
-  double stiffness = 0;              ///< k [N/m], >= 0
-  double damping = 0;                ///< c [N·s/m], >= 0
-  double rest_length = kFromStart;   ///< L [m], >= 0, or the distance at the start
+  int a = 0, b = 0;                 ///< points, different
+  double stiffness = 0;             ///< k [N/m], >= 0
+  double damping = 0;               ///< c [N·s/m], >= 0
+  double rest_length = kFromStart;  ///< L [m], >= 0, or the distance at the start
   Family family = Family::Raw;
 };
 

@@ -130,7 +130,9 @@ Values<S> WindField<S>::damping(const Points<S>& x, const Points<S>& v) const {
   const double mean = wind_.velocity.norm() * (1 + wind_.gust);
   const double scale = wind_.air_density * (wind_.drag + wind_.lift) / 3;
   for (const Triangle& t : triangles_) {
-    const auto at = [](const Points<S>& p, int i) -> Vec3 { return p.row(i).matrix().transpose().template cast<double>(); };
+    const auto at = [](const Points<S>& p, int i) -> Vec3 {
+      return p.row(i).matrix().transpose().template cast<double>();
+    };
     const double area = 0.5 * (at(x, t[1]) - at(x, t[0])).cross(at(x, t[2]) - at(x, t[0])).norm();
     const double speed = mean + (at(v, t[0]) + at(v, t[1]) + at(v, t[2])).norm() / 3;
     for (const int corner : t) out[corner] += S(scale * area * speed);
@@ -139,8 +141,7 @@ Values<S> WindField<S>::damping(const Points<S>& x, const Points<S>& v) const {
 }
 
 template <class S>
-void WindField<S>::add_damping_times(const Points<S>& x, const Points<S>& v, const Points<S>& d,
-                                     Points<S>& out) const {
+void WindField<S>::add_damping_times(const Points<S>& x, const Points<S>& v, const Points<S>& d, Points<S>& out) const {
   out += d.colwise() * damping(x, v);
 }
 

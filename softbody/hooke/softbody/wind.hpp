@@ -11,18 +11,18 @@ namespace hooke::softbody {
 
 /// Uniform wind with gusts. A still wind is air drag.
 struct Wind {
-  Vec3 velocity{0, 0, 0};     ///< mean [m/s]
-  double gust = 0;            ///< largest change of speed as a share of the mean, >= 0
-  double gust_period = 2;     ///< of the slowest gust [s], > 0
-  double swing = 0;           ///< largest change of direction, about the y axis [rad]
-  double start = 0;           ///< time of the world at which the wind's own clock begins [s]
-  double stop = 1e300;        ///< from here on its own clock the air is still [s]
-  double fade = 0.3;          ///< before `stop`, the wind dies down over this time [s]
-  double air_density = 1.204; ///< [kg/m³]
-  double drag = 1.2;          ///< coefficient of a plate across the wind
-  double lift = 0.6;          ///< coefficient of a plate at an angle
-  std::uint32_t seed = 1;     ///< of the gusts' phases
-  bool once_a_tick = false;   ///< evaluate at the start of a tick and hold: cheaper, first order in the tick
+  Vec3 velocity{0, 0, 0};      ///< mean [m/s]
+  double gust = 0;             ///< largest change of speed as a share of the mean, >= 0
+  double gust_period = 2;      ///< of the slowest gust [s], > 0
+  double swing = 0;            ///< largest change of direction, about the y axis [rad]
+  double start = 0;            ///< time of the world at which the wind's own clock begins [s]
+  double stop = 1e300;         ///< from here on its own clock the air is still [s]
+  double fade = 0.3;           ///< before `stop`, the wind dies down over this time [s]
+  double air_density = 1.204;  ///< [kg/m³]
+  double drag = 1.2;           ///< coefficient of a plate across the wind
+  double lift = 0.6;           ///< coefficient of a plate at an angle
+  std::uint32_t seed = 1;      ///< of the gusts' phases
+  bool once_a_tick = false;    ///< evaluate at the start of a tick and hold: cheaper, first order in the tick
 
   Vec3 velocity_at(double t) const;  ///< [m/s] at world time t; a smooth function of time alone
 };
