@@ -4,15 +4,11 @@
 #include <scene/parse.hpp>
 
 #include <algorithm>
-#include <array>
 #include <filesystem>
 
 namespace hooke::scene {
 
 namespace {
-
-constexpr std::array kSheets{32, 64, 128};
-const std::string kSheetName = "hanging-sheet-";
 
 // Where scene files are: beside the source, else where an installed command finds its share.
 std::vector<std::filesystem::path> scene_folders() {
@@ -37,24 +33,10 @@ std::filesystem::path file_of(const std::string& name) {
 
 }  // namespace
 
-SceneDescription hanging_sheet(int n) {
-  SceneDescription scene;
-  scene.file = kSheetName + std::to_string(n);
-  scene.title = "Hanging sheet, " + std::to_string(n) + " x " + std::to_string(n) + " points";
-  scene.duration = 0.5;
-  SoftBody sheet;
-  sheet.name = "sheet";
-  sheet.path = "bodies[0]";
-  sheet.form = Grid{1, 1, n, n, {1, 0, 0}, {0, -1, 1}};
-  sheet.material = FixedMaterial{0.3, 500, 100, 5, 0};
-  sheet.pin = {"top"};
-  scene.bodies.push_back(std::move(sheet));
-  return scene;
-}
-
 std::vector<NamedScene> named_scenes() {
   std::vector<NamedScene> out;
-  for (const int n : kSheets) out.push_back({kSheetName + std::to_string(n), hanging_sheet(n).title});
+  for (const StandardScene& scene : standard_scenes())
+    if (scene.description) out.push_back({scene.name, scene.title});
   for (const auto& folder : scene_folders())
     for (const auto& entry : std::filesystem::directory_iterator(folder)) {
       if (entry.path().extension() != ".json") continue;
@@ -74,8 +56,11 @@ SceneDescription find_scene(const std::string& path_or_name) {
   std::error_code error;
   if (std::filesystem::exists(path_or_name, error) && !std::filesystem::is_directory(path_or_name, error))
     return read_scene(path_or_name);
-  for (const int n : kSheets)
-    if (path_or_name == kSheetName + std::to_string(n)) return hanging_sheet(n);
+  for (StandardScene& scene : standard_scenes()) {
+    if (path_or_name != scene.name) continue;
+    if (scene.description) return *std::move(scene.description);
+    throw Error(path_or_name + " is a scene of the report alone (hooke report): no scene file can say it");
+  }
   if (const auto path = file_of(path_or_name); !path.empty()) return read_scene(path);
   std::string names;
   for (const NamedScene& scene : named_scenes()) names += (names.empty() ? "" : ", ") + scene.name;

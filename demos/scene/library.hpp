@@ -1,7 +1,7 @@
-// Scenes by name: files that come with Hooke and scenes that are generated.
+// Scenes by name: files that come with Hooke and the standard scenes.
 #pragma once
 
-#include <scene/description.hpp>
+#include <scene/standard.hpp>
 
 #include <string>
 #include <vector>
@@ -17,9 +17,5 @@ std::vector<NamedScene> named_scenes();
 
 /// A scene by path or by name. Throws hooke::Error, which lists the names where there is neither.
 SceneDescription find_scene(const std::string& path_or_name);
-
-/// S1: N × N points of equal mass, 1 m, 0.3 kg, structural 500, shear 100, bend 5 N/m, no damping,
-/// first row pinned, tilted by 45°.
-SceneDescription hanging_sheet(int n);
 
 }  // namespace hooke::scene
