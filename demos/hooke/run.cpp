@@ -157,7 +157,7 @@ std::string chosen(const scene::Scene& scene) {
   std::string out;
   const double tick = scene.world.clock().tick();
   for (const scene::SceneBody& body : scene.bodies) {
-    const scene::MotionFacts facts = scene::motion_facts(*body.body);
+    const MotionFacts facts = body.body->motion_facts();
     out += body.body->name() + ": " + std::to_string(body.body->size()) + " points, " +
            std::to_string(body.network->springs.size()) + " springs; " + facts.method + ", " + facts.precision + ", ";
     out += format("%ld substep%s of %.4g ms a tick of %.4g ms%s\n", long(facts.substeps),

@@ -200,7 +200,7 @@ std::vector<std::string> Shot::caption(std::size_t frame) const {
   for (const scene::SceneBody& body : scene_.bodies) points += body.body->size();
   char text[200];
   if (!scene_.bodies.empty()) {
-    const scene::MotionFacts facts = scene::motion_facts(*scene_.bodies[0].body);
+    const MotionFacts facts = scene_.bodies[0].body->motion_facts();
     std::snprintf(text, sizeof text, "%ld points, %s, %s, step %.3g ms", long(points), facts.method.c_str(),
                   facts.precision.c_str(),
                   1e3 * scene_.world.clock().tick() / double(std::max<Index>(1, facts.substeps)));

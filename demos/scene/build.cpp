@@ -282,15 +282,6 @@ class Builder {
   Scene scene_;
 };
 
-template <class S>
-bool facts(const Body& body, const char* precision, MotionFacts& out) {
-  const auto* points = dynamic_cast<const PointBody<S>*>(&body);
-  if (!points) return false;
-  out = {std::string(points->settings().method->name), precision, points->substeps(), points->stable_step(),
-         points->settings().dt};
-  return true;
-}
-
 }  // namespace
 
 Scene build(const SceneDescription& description, const Scene* reuse) { return Builder(description, reuse).run(); }
@@ -306,12 +297,6 @@ void override_solver(SceneDescription& description, const std::string& method, d
     if (!precision.empty())
       body.solver.precision = precision == "float" ? softbody::Precision::Float : softbody::Precision::Double;
   }
-}
-
-MotionFacts motion_facts(const Body& body) {
-  MotionFacts out;
-  facts<float>(body, "float", out) || facts<double>(body, "double", out);
-  return out;
 }
 
 }  // namespace hooke::scene

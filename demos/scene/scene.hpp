@@ -54,13 +54,4 @@ Scene build(const SceneDescription& description, const Scene* reuse = nullptr);
 /// Sets the solver of every body: what is given on the command line.
 void override_solver(SceneDescription& description, const std::string& method, double dt, const std::string& precision);
 
-/// How a body is moved, whatever its precision.
-struct MotionFacts {
-  std::string method, precision;
-  Index substeps = 0;      ///< in the last tick
-  double stable_step = 0;  ///< [s] now; infinity where any is stable, 0 where none is
-  double wanted_dt = 0;    ///< [s]; 0: automatic
-};
-MotionFacts motion_facts(const Body& body);
-
 }  // namespace hooke::scene

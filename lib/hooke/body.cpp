@@ -22,6 +22,9 @@ std::string StepReport::text() const {
   return where + ": " + what + " after " + std::to_string(time) + " s; " + advice;
 }
 
+// Nothing is known to oscillate.
+double Body::stable_step(const Method& method) const { return largest_stable_step(method, 0, 0); }
+
 Vec3 Body::displacement(Index point) const {
   check_index(point, size());
   return row(positions(), point) - row(start_positions(), point);

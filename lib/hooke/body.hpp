@@ -3,8 +3,10 @@
 #pragma once
 
 #include <hooke/collider.hpp>
+#include <hooke/method.hpp>
 #include <hooke/types.hpp>
 
+#include <cstdint>
 #include <functional>
 #include <span>
 #include <string>
@@ -35,6 +37,18 @@ struct Energy {
   double gravitational = 0;  ///< [J], -m g · x of the free points, 0 at the world's origin
   double elastic = 0;        ///< [J], of all force fields that have a potential
   double total() const { return kinetic + gravitational + elastic; }
+};
+
+/// How a body is moved.
+struct MotionFacts {
+  std::string method;            ///< its name; empty: the body is not moved by one
+  std::string precision;         ///< "float" or "double"
+  Index substeps = 0;            ///< of the last tick
+  double stable_step = 0;        ///< [s], in the present state; infinity: any; 0: none
+  double wanted_dt = 0;          ///< [s]; 0: automatic
+  bool velocity_forces = false;  ///< drag or dampers act at every stage; some methods refuse them
+  std::int64_t evaluations = 0;  ///< of all forces, since creation
+  std::int64_t products = 0;     ///< of stiffness and damping with a vector, in implicit solves, since creation
 };
 
 /// One tick, as the world hands it to a body.
@@ -91,6 +105,13 @@ class Body {
 
   virtual Energy energy(const Vec3& gravity) const = 0;
   virtual Vec3 momentum() const = 0;  ///< [kg m/s], free points
+
+  /// How it is moved. Costs as much as stable_step.
+  virtual MotionFacts motion_facts() const { return {}; }
+  /// The largest stable substep [s] that `method` would have in the present state, as
+  /// largest_stable_step, whether or not it accepts the body's forces. Cost: about one evaluation.
+  virtual double stable_step(const Method& method) const;
+
   double total_mass() const { return masses().sum(); }
 
   /// Displacement since creation of a point, or of the centre of mass [m].

@@ -18,6 +18,16 @@ constexpr double kStandstill = std::is_same_v<S, float> ? 1e-20 : 1e-100;
 // How often compressed springs are met with the positive part of their stiffness.
 constexpr int kSafeIterations = 10;
 
+// Step control: exponents of this and the last error (PI, β = 0.04), what is kept of the step that they
+// suggest, and the most that a step may shrink and grow.
+constexpr double kPiBeta = 0.04, kStepShare = 0.9, kMostShrink = 0.2, kMostGrowth = 5;
+
+template <class S>
+double tolerance_of(const Implicit& scheme) {
+  const double least = std::is_same_v<S, float> ? 1e-6 : 1e-12;
+  return std::max(scheme.tolerance, least);
+}
+
 }  // namespace
 
 template <class S>
@@ -25,6 +35,19 @@ SolveResult Integrator<S>::step(Dynamics<S>& dynamics, Points<S>& x, Points<S>& 
   if (!method_->accepts_velocity_forces && dynamics.uses_velocity())
     throw std::invalid_argument(std::string(method_->name) + " needs forces of position alone, got drag or dampers");
   return std::visit([&](const auto& scheme) { return run(scheme, dynamics, x, v, t, h); }, method_->scheme);
+}
+
+template <class S>
+void Integrator<S>::evaluate(Dynamics<S>& dynamics, const Points<S>& x, const Points<S>& v, double t, Points<S>& a) {
+  ++work_.evaluations;
+  dynamics.acceleration(x, v, t, a);
+}
+
+// product_ += (h²K + hD) direction_.
+template <class S>
+void Integrator<S>::multiply(Dynamics<S>& dynamics, const Points<S>& x, const Points<S>& v, S h, bool safe) {
+  ++work_.products;
+  dynamics.add_implicit_times(x, v, h, safe, direction_, product_);
 }
 
 // Pins and surfaces after a move from from_ at t0 to x at t1.
@@ -38,6 +61,10 @@ template <class S>
 SolveResult Integrator<S>::run(const Splitting& table, Dynamics<S>& dynamics, Points<S>& x, Points<S>& v, double t,
                                double h) {
   const bool uses_velocity = dynamics.uses_velocity();
+  const bool held = dynamics.prescribes(), collides = dynamics.collides();
+  // Drifts that go back in time must not meet surfaces: those wait for the end of the step.
+  if (collides) from_ = x;
+  const std::size_t last_drift = table.drift.size() - (table.drift.back() == 0 ? 2 : 1);
   double now = t;
   for (std::size_t i = 0; i < table.kick.size(); ++i) {
     if (table.kick[i] != 0) {
@@ -47,31 +74,32 @@ SolveResult Integrator<S>::run(const Splitting& table, Dynamics<S>& dynamics, Po
           // The velocity at the end of this kick, predicted with the last acceleration: taking
           // the one at its start instead would cost an order.
           predicted_ = v + kick * acceleration_;
-          dynamics.acceleration(x, predicted_, now, acceleration_);
+          evaluate(dynamics, x, predicted_, now, acceleration_);
         } else {
-          dynamics.acceleration(x, v, now, acceleration_);
+          evaluate(dynamics, x, v, now, acceleration_);
         }
         acceleration_known_ = true;
       }
       v += kick * acceleration_;
     }
     if (table.drift[i] != 0) {
-      const double next = i + 1 == table.drift.size() ? t + h : now + table.drift[i] * h;
-      if (dynamics.prescribes() || dynamics.collides()) from_ = x;
+      const double next = i == last_drift ? t + h : now + table.drift[i] * h;
+      if (held) drift_from_ = x;
       x += S(table.drift[i] * h) * v;
-      finish(dynamics, now, next, x, v);
+      if (held) dynamics.prescribe(now, drift_from_, next, x, v);
       now = next;
       acceleration_known_ = false;
+      if (collides && i == last_drift) dynamics.collide(t, from_, t + h, x, v);
     }
   }
-  if (table.drift.back() == 0 && dynamics.collides()) dynamics.settle(v);
+  if (collides && table.drift.back() == 0) dynamics.settle(v);
   return {};
 }
 
 template <class S>
 SolveResult Integrator<S>::run(const Verlet&, Dynamics<S>& dynamics, Points<S>& x, Points<S>& v, double t, double h) {
   const S step = S(h);
-  if (!acceleration_known_) dynamics.acceleration(x, v, t, acceleration_);
+  if (!acceleration_known_) evaluate(dynamics, x, v, t, acceleration_);
   if (increment_step_ != h) {
     increment_ = step * v - (S(0.5) * step * step) * acceleration_;
     increment_step_ = h;
@@ -88,9 +116,9 @@ SolveResult Integrator<S>::run(const Verlet&, Dynamics<S>& dynamics, Points<S>& 
   }
   if (dynamics.uses_velocity()) {
     predicted_ = increment_ / step + (S(0.5) * step) * acceleration_;
-    dynamics.acceleration(x, predicted_, t + h, acceleration_);
+    evaluate(dynamics, x, predicted_, t + h, acceleration_);
   } else {
-    dynamics.acceleration(x, v, t + h, acceleration_);
+    evaluate(dynamics, x, v, t + h, acceleration_);
   }
   acceleration_known_ = true;
   // The velocity of the same time as x; the increment itself is half a step behind.
@@ -99,15 +127,21 @@ SolveResult Integrator<S>::run(const Verlet&, Dynamics<S>& dynamics, Points<S>& 
   return {};
 }
 
+// The stages of one step of h; the last stage is left in stage_x_ and stage_v_.
 template <class S>
-SolveResult Integrator<S>::run(const RungeKutta& table, Dynamics<S>& dynamics, Points<S>& x, Points<S>& v, double t,
-                               double h) {
+void Integrator<S>::run_stages(const RungeKutta& table, Dynamics<S>& dynamics, const Points<S>& x, const Points<S>& v,
+                               double t, double h) {
   const std::size_t stages = table.weight.size();
   stage_velocity_.resize(stages);
   stage_acceleration_.resize(stages);
   const bool held = dynamics.prescribes();
   from_ = x;
   for (std::size_t i = 0; i < stages; ++i) {
+    if (i == 0 && acceleration_known_) {
+      stage_velocity_[0] = v;
+      stage_acceleration_[0] = acceleration_;
+      continue;
+    }
     double time = 0;
     stage_x_ = x;
     stage_v_ = v;
@@ -120,12 +154,106 @@ SolveResult Integrator<S>::run(const RungeKutta& table, Dynamics<S>& dynamics, P
     }
     if (held) dynamics.prescribe(t, from_, t + time * h, stage_x_, stage_v_);
     stage_velocity_[i] = stage_v_;
-    dynamics.acceleration(stage_x_, stage_v_, t + time * h, stage_acceleration_[i]);
+    evaluate(dynamics, stage_x_, stage_v_, t + time * h, stage_acceleration_[i]);
   }
+}
+
+template <class S>
+SolveResult Integrator<S>::run(const RungeKutta& table, Dynamics<S>& dynamics, Points<S>& x, Points<S>& v, double t,
+                               double h) {
+  run_stages(table, dynamics, x, v, t, h);
+  if (table.first_same_as_last) {
+    x = stage_x_;
+    v = stage_v_;
+    acceleration_ = stage_acceleration_.back();
+    acceleration_known_ = !dynamics.collides();
+  } else {
+    for (std::size_t i = 0; i < table.weight.size(); ++i) {
+      if (table.weight[i] == 0) continue;
+      x += S(table.weight[i] * h) * stage_velocity_[i];
+      v += S(table.weight[i] * h) * stage_acceleration_[i];
+    }
+  }
+  finish(dynamics, t, t + h, x, v);
+  return {};
+}
+
+// max(|e_x|, h |e_v|) of the stages over free points and coordinates [m]; NaN where one is NaN.
+template <class S>
+double Integrator<S>::error_of_stages(const RungeKutta& table, const Values<S>& inverse_mass, double h) {
+  double worst = 0;
+  for (const auto* stages : {&stage_velocity_, &stage_acceleration_}) {
+    predicted_.setZero(inverse_mass.size(), 3);
+    for (std::size_t i = 0; i < table.error.size(); ++i)
+      if (table.error[i] != 0) predicted_ += S(table.error[i] * h) * (*stages)[i];
+    for (int k = 0; k < 3; ++k) predicted_.col(k) = (inverse_mass == S(0)).select(S(0), predicted_.col(k));
+    if (!predicted_.allFinite()) return std::numeric_limits<double>::quiet_NaN();
+    if (predicted_.size() == 0) return 0;
+    worst = std::max(worst, double(predicted_.abs().maxCoeff()) * (stages == &stage_velocity_ ? 1 : h));
+  }
+  return worst;
+}
+
+template <class S>
+SolveResult Integrator<S>::adapt(Dynamics<S>& dynamics, Points<S>& x, Points<S>& v, double t, double span,
+                                 double tolerance, double shortest) {
+  const auto* table = std::get_if<RungeKutta>(&method_->scheme);
+  if (!table || table->error.empty())
+    throw std::invalid_argument(std::string(method_->name) + " has no error estimate to adapt its steps to");
+  const double power = 1.0 / method_->order;
+  adapted_steps_ = 0;
+  double done = 0, h = adapted_step_ > 0 ? adapted_step_ : span;
+  while (done < span) {
+    // What is left in equal steps, so that none is tiny.
+    const double left = span - done;
+    const double count = std::ceil(left / std::max(h, shortest) - 1e-9);
+    const bool last = !(count > 1);
+    h = last ? left : left / count;
+    run_stages(*table, dynamics, x, v, t + done, h);
+    const double rounding = 8 * double(std::numeric_limits<S>::epsilon()) * (x.size() ? double(x.abs().maxCoeff()) : 0);
+    const double error = error_of_stages(*table, dynamics.inverse_mass(), h) / std::max(tolerance, rounding);
+    const double shrink = std::pow(error, power - 0.75 * kPiBeta);
+    if (!(error <= 1) && h > 1.001 * shortest) {
+      acceleration_ = stage_acceleration_[0];
+      acceleration_known_ = true;
+      h *= std::isfinite(shrink) ? std::clamp(kStepShare / shrink, kMostShrink, 1.0) : kMostShrink;
+      continue;
+    }
+    x = stage_x_;
+    v = stage_v_;
+    acceleration_ = stage_acceleration_.back();
+    acceleration_known_ = !dynamics.collides();
+    finish(dynamics, t + done, last ? t + span : t + done + h, x, v);
+    ++adapted_steps_;
+    done = last ? span : done + h;
+    if (!std::isfinite(error)) return {};  // the caller sees it in x and v
+    const double growth = error > 0 ? kStepShare * std::pow(adapted_error_, kPiBeta) / shrink : kMostGrowth;
+    h *= std::clamp(growth, kMostShrink, kMostGrowth);
+    adapted_error_ = std::max(error, 1e-4);
+    adapted_step_ = h;
+  }
+  return {};
+}
+
+template <class S>
+SolveResult Integrator<S>::run(const Nystrom& table, Dynamics<S>& dynamics, Points<S>& x, Points<S>& v, double t,
+                               double h) {
+  const std::size_t stages = table.node.size();
+  stage_acceleration_.resize(stages);
+  const bool held = dynamics.prescribes();
+  from_ = x;
   for (std::size_t i = 0; i < stages; ++i) {
-    if (table.weight[i] == 0) continue;
-    x += S(table.weight[i] * h) * stage_velocity_[i];
-    v += S(table.weight[i] * h) * stage_acceleration_[i];
+    stage_x_ = x + S(table.node[i] * h) * v;
+    for (std::size_t j = 0; j < table.stage[i].size(); ++j)
+      if (table.stage[i][j] != 0) stage_x_ += S(table.stage[i][j] * h * h) * stage_acceleration_[j];
+    stage_v_ = v;
+    if (held) dynamics.prescribe(t, from_, t + table.node[i] * h, stage_x_, stage_v_);
+    evaluate(dynamics, stage_x_, stage_v_, t + table.node[i] * h, stage_acceleration_[i]);
+  }
+  x += S(h) * v;
+  for (std::size_t i = 0; i < stages; ++i) {
+    if (table.position[i] != 0) x += S(table.position[i] * h * h) * stage_acceleration_[i];
+    v += S(table.velocity[i] * h) * stage_acceleration_[i];
   }
   finish(dynamics, t, t + h, x, v);
   return {};
@@ -161,7 +289,7 @@ bool Integrator<S>::solve_linear(Dynamics<S>& dynamics, S h, bool safe, double t
   for (Index i = 0; i < limit && size > target && slope > 0; ++i) {
     product_.resize(x.rows(), 3);
     for (int k = 0; k < 3; ++k) product_.col(k) = mass * direction_.col(k);
-    dynamics.add_implicit_times(x, v, h, safe, direction_, product_);
+    multiply(dynamics, x, v, h, safe);
     hold(product_);
     const double curvature = dot(direction_, product_);
     if (!(curvature > 0)) return false;
@@ -186,7 +314,7 @@ double Integrator<S>::rounding_of_force(Dynamics<S>& dynamics, S h) {
   for (Index i = 0; i < direction_.size(); ++i)
     if ((std::uint32_t(i) * 2654435761u) >> 31) direction_.data()[i] *= S(-1);
   product_.setZero(stage_x_.rows(), 3);
-  dynamics.add_implicit_times(stage_x_, stage_v_, h, true, direction_, product_);
+  multiply(dynamics, stage_x_, stage_v_, h, true);
   for (int k = 0; k < 3; ++k) product_.col(k) *= dynamics.inverse_mass();
   const double found = double(product_.abs().maxCoeff());
   return std::isfinite(found) ? found : 0;
@@ -195,16 +323,18 @@ double Integrator<S>::rounding_of_force(Dynamics<S>& dynamics, S h) {
 template <class S>
 SolveResult Integrator<S>::run(const Implicit& scheme, Dynamics<S>& dynamics, Points<S>& x, Points<S>& v, double t,
                                double h) {
-  const double tolerance = scheme.tolerance > 0 ? scheme.tolerance : (std::is_same_v<S, float> ? 1e-6 : 1e-12);
+  const double tolerance = tolerance_of<S>(scheme);
   const Values<S>& mass = dynamics.mass();
   const Values<S>& inverse_mass = dynamics.inverse_mass();
-  const S step = S(h);
+  // With u = vθ and the end at t + θh both unknowns are those of a backward Euler step of θh.
+  const double solved = scheme.theta * h;
+  const S step = S(solved);
   from_ = x;
   // Where the step would end with velocity u, and by how much u misses v + h a there.
   const auto miss = [&](Points<S>& u, Points<S>& end, Points<S>& out) {
     end = from_ + step * u;
-    if (dynamics.prescribes()) dynamics.prescribe(t, from_, t + h, end, u);
-    dynamics.acceleration(end, u, t + h, acceleration_);
+    if (dynamics.prescribes()) dynamics.prescribe(t, from_, t + solved, end, u);
+    evaluate(dynamics, end, u, t + solved, acceleration_);
     out = v + step * acceleration_ - u;
     for (int k = 0; k < 3; ++k) out.col(k) = (inverse_mass == S(0)).select(S(0), out.col(k));
     if (out.size() == 0) return 0.0;
@@ -217,11 +347,18 @@ SolveResult Integrator<S>::run(const Implicit& scheme, Dynamics<S>& dynamics, Po
   SolveResult result;
   for (int iteration = 0;; ++iteration) {
     const double scale = std::max({double(stage_v_.abs().maxCoeff()), double(v.abs().maxCoeff()),
-                                   h * double(acceleration_.abs().maxCoeff()), kStandstill<S>});
+                                   solved * double(acceleration_.abs().maxCoeff()), kStandstill<S>});
     result.residual = residual / scale;
-    result.converged = result.residual <= tolerance;
+    result.converged = scheme.linearised ? residual == 0 : result.residual <= tolerance;
     if (result.converged || iteration == scheme.max_iterations || !std::isfinite(residual)) break;
     for (int k = 0; k < 3; ++k) right_.col(k) *= mass;
+    if (scheme.linearised) {
+      if (!solve_linear(dynamics, step, false, tolerance, stage_x_, stage_v_, right_, update_))
+        solve_linear(dynamics, step, true, tolerance, stage_x_, stage_v_, right_, update_);
+      stage_v_ += update_;
+      result.converged = true;
+      break;
+    }
     // The exact stiffness converges quadratically but may be indefinite in compressed springs.
     const double inner = std::clamp(0.01 * result.residual, 0.1 * tolerance, 1e-3);
     // Where it is, the positive part alone leads downhill far away, and what the gradients found
@@ -257,8 +394,14 @@ SolveResult Integrator<S>::run(const Implicit& scheme, Dynamics<S>& dynamics, Po
     stage_x_ = trial_x_;
     residual = best;
   }
-  x = stage_x_;
-  v = stage_v_;
+  if (scheme.theta == 1 && !scheme.linearised) {
+    x = stage_x_;
+    v = stage_v_;
+  } else {
+    x = from_ + S(h) * stage_v_;
+    v += (stage_v_ - v) / S(scheme.theta);
+    if (dynamics.prescribes()) dynamics.prescribe(t, from_, t + h, x, v);
+  }
   if (dynamics.collides()) dynamics.collide(t, from_, t + h, x, v);
   return result;
 }

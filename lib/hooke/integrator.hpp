@@ -5,6 +5,8 @@
 #include <hooke/method.hpp>
 #include <hooke/types.hpp>
 
+#include <cstdint>
+
 namespace hooke {
 
 /// The equations of motion x'' = a(x, v, t) of a set of points, and what holds them: points
@@ -51,6 +53,13 @@ struct SolveResult {
   double residual = 0;  ///< relative to the velocity scale
 };
 
+/// What integration has cost so far. A force evaluation and a product with K and D are about as dear
+/// as each other; explicit methods need no products.
+struct Work {
+  std::int64_t evaluations = 0;  ///< of the accelerations of all points
+  std::int64_t products = 0;     ///< of h²K + hD with a vector, in implicit solves
+};
+
 /// Runs one method. Owns scratch memory and nothing else: no allocation in a step once the
 /// number of points is known.
 template <class S>
@@ -64,6 +73,18 @@ class Integrator {
   /// @throws std::invalid_argument where the method does not accept velocity-dependent forces
   SolveResult step(Dynamics<S>& dynamics, Points<S>& x, Points<S>& v, double t, double h);
 
+  /// From t to t + span in as many equal or unequal steps as the method's error estimate asks for. Each
+  /// accepted step has max over free points and coordinates of max(|e_x|, h |e_v|) ≤ tolerance [m], where
+  /// e_x, e_v are the estimated errors of position and velocity; below the rounding of the positions the
+  /// tolerance counts as that rounding. Steps are never shorter than `shortest` [s]; those are taken
+  /// whatever their error. The same start gives the same steps.
+  SolveResult adapt(Dynamics<S>& dynamics, Points<S>& x, Points<S>& v, double t, double span, double tolerance,
+                    double shortest);
+  Index adapted_steps() const { return adapted_steps_; }  ///< accepted by the last `adapt`
+
+  /// Since construction; kept by restart.
+  const Work& work() const { return work_; }
+
   /// Must be called when anything but this integrator changed x, v, or what forces depend on.
   void restart() { acceleration_known_ = false, increment_step_ = 0; }
 
@@ -71,7 +92,12 @@ class Integrator {
   SolveResult run(const Splitting&, Dynamics<S>&, Points<S>& x, Points<S>& v, double t, double h);
   SolveResult run(const Verlet&, Dynamics<S>&, Points<S>& x, Points<S>& v, double t, double h);
   SolveResult run(const RungeKutta&, Dynamics<S>&, Points<S>& x, Points<S>& v, double t, double h);
+  SolveResult run(const Nystrom&, Dynamics<S>&, Points<S>& x, Points<S>& v, double t, double h);
   SolveResult run(const Implicit&, Dynamics<S>&, Points<S>& x, Points<S>& v, double t, double h);
+  void evaluate(Dynamics<S>&, const Points<S>& x, const Points<S>& v, double t, Points<S>& a);
+  void multiply(Dynamics<S>&, const Points<S>& x, const Points<S>& v, S h, bool safe);
+  void run_stages(const RungeKutta&, Dynamics<S>&, const Points<S>& x, const Points<S>& v, double t, double h);
+  double error_of_stages(const RungeKutta&, const Values<S>& inverse_mass, double h);
   void finish(Dynamics<S>&, double t0, double t1, Points<S>& x, Points<S>& v);
   bool solve_linear(Dynamics<S>&, S h, bool safe, double tolerance, const Points<S>& x, const Points<S>& v,
                     const Points<S>& right, Points<S>& solution);
@@ -81,7 +107,11 @@ class Integrator {
   const Method* method_;
   bool acceleration_known_ = false;  // acceleration_ is a(x, v, t) of the coming step's start
   double increment_step_ = 0;        // the h that increment_ was made with; 0: not made yet
-  Points<S> acceleration_, increment_, from_, predicted_;
+  double adapted_step_ = 0;          // what error control suggests next; 0: nothing yet
+  double adapted_error_ = 1;         // of the last accepted step, in tolerances
+  Index adapted_steps_ = 0;
+  Work work_;
+  Points<S> acceleration_, increment_, from_, drift_from_, predicted_;
   std::vector<Points<S>> stage_velocity_, stage_acceleration_;
   Points<S> stage_x_, stage_v_, residual_, preconditioned_, right_, direction_, product_, trial_x_, trial_v_, update_;
 };

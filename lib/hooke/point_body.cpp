@@ -41,6 +41,7 @@ PointBody<S>::PointBody(std::string name, PointMasses<S> points, MotionSettings 
     fail("inverse masses must not be negative");
   if (!(settings_.dt >= 0) || !std::isfinite(settings_.dt)) fail("dt must not be negative");
   if (!(settings_.thickness >= 0) || !std::isfinite(settings_.thickness)) fail("thickness must not be negative");
+  if (!(settings_.tolerance > 0) || !std::isfinite(settings_.tolerance)) fail("tolerance must be positive");
   start_ = previous_position_ = points_.position;
   previous_velocity_ = points_.velocity;
 }
@@ -300,9 +301,36 @@ typename ForceField<S>::Rates PointBody<S>::rate_bounds() const {
 }
 
 template <class S>
-double PointBody<S>::stable_step() const {
+double PointBody<S>::stable_step(const Method& method) const {
   const auto rates = rate_bounds();
-  return largest_stable_step(*settings_.method, std::sqrt(rates.omega_squared), rates.gamma);
+  return largest_stable_step(method, std::sqrt(rates.omega_squared), rates.gamma);
+}
+
+template <class S>
+MotionFacts PointBody<S>::motion_facts() const {
+  const Work& work = integrator_.work();
+  return {std::string(settings_.method->name),
+          std::is_same_v<S, float> ? "float" : "double",
+          substeps(),
+          stable_step(),
+          settings_.dt,
+          uses_velocity_,
+          work.evaluations,
+          work.products};
+}
+
+// The substep where none is given.
+template <class S>
+double PointBody<S>::automatic_step() const {
+  const Method& method = *settings_.method;
+  const auto rates = rate_bounds();
+  const double omega = std::sqrt(rates.omega_squared);
+  const double stable = kStepSafety * largest_stable_step(method, omega, rates.gamma);
+  if (method.stability_limit != 0 || omega == 0) return stable;
+  // No step is stable undamped; a small phase per step keeps the growth slow. Heavy damping has a
+  // limit of its own, which the phase must not pass.
+  const double damped = kStepSafety * largest_stable_step(method, 0, rates.gamma);
+  return std::max(stable, std::min(kUnstablePhase / omega, damped));
 }
 
 template <class S>
@@ -310,18 +338,11 @@ void PointBody<S>::choose_substeps(const Tick& tick) {
   const double length = tick.end - tick.start;
   if (settings_.dt > 0) {
     wanted_dt_ = settings_.dt;
+  } else if (adapts()) {
+    wanted_dt_ = length;
   } else if (last_estimate_ < 0 || tick.start - last_estimate_ >= kEstimateInterval * (1 - 1e-9)) {
     last_estimate_ = tick.start;
-    wanted_dt_ = kStepSafety * stable_step();
-    if (settings_.method->stability_limit == 0) {
-      // No step is stable undamped; a small phase per step keeps the growth slow.
-      const double omega_step = kUnstablePhase * largest_stable_step(semi_implicit_euler(), 1, 0) / 2;
-      const auto rates = rate_bounds();
-      // Heavy damping has a limit of its own, which the phase must not pass.
-      const double damped = largest_stable_step(*settings_.method, 0, rates.gamma);
-      if (rates.omega_squared > 0)
-        wanted_dt_ = std::max(wanted_dt_, std::min(omega_step / std::sqrt(rates.omega_squared), kStepSafety * damped));
-    }
+    wanted_dt_ = automatic_step();
   }
   const double count = std::ceil(length / wanted_dt_ - 1e-9);
   substeps_ = std::clamp<Index>(count < double(settings_.max_substeps) ? Index(count) : settings_.max_substeps, 1,
@@ -330,6 +351,9 @@ void PointBody<S>::choose_substeps(const Tick& tick) {
 
 template <class S>
 SolveResult PointBody<S>::substep(double t, double h) {
+  if (adapts())
+    return integrator_.adapt(*this, points_.position, points_.velocity, t, h, settings_.tolerance,
+                             h / double(settings_.max_substeps));
   return integrator_.step(*this, points_.position, points_.velocity, t, h);
 }
 
@@ -374,7 +398,8 @@ StepReport PointBody<S>::explain(bool finite) {
   const std::string limit = stable == 0             ? "0 (none undamped)"
                             : std::isfinite(stable) ? std::to_string(1e3 * stable) + " ms"
                                                     : "without bound";
-  report.advice = "the substep was " + std::to_string(1e3 * (tick_.end - tick_.start) / double(substeps_)) +
+  report.advice = "the substep was " +
+                  std::to_string(1e3 * (tick_.end - tick_.start) / double(std::max<Index>(substeps(), 1))) +
                   " ms, the largest stable one of " + std::string(settings_.method->name) + " is " + limit +
                   "; lower dt, lower the stiffness or choose another method";
   return report;

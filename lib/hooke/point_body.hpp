@@ -20,6 +20,9 @@ struct MotionSettings {
   double thickness = 0;            ///< distance kept from colliders [m]
   bool collides = true;            ///< false: colliders are ignored
   Index max_substeps = 1'000'000;  ///< a tick; the automatic step stops there
+  /// Adaptive methods with dt = 0: most that the estimated error of a step may be [m], as in
+  /// Integrator::adapt; > 0. The error of a second is about as many times this as steps it takes.
+  double tolerance = 1e-6;
 };
 
 template <class S>
@@ -34,11 +37,14 @@ class PointBody : public Body, protected Dynamics<S> {
 
   const PointMasses<S>& state() const { return points_; }
   const MotionSettings& settings() const { return settings_; }
-  Index substeps() const { return substeps_; }  ///< in the last tick
+  Index substeps() const { return adapts() ? integrator_.adapted_steps() : substeps_; }  ///< in the last tick
 
+  using Body::stable_step;
   /// The largest stable substep [s] of the method in the present state; infinity or 0 as in
   /// largest_stable_step.
-  double stable_step() const;
+  double stable_step() const { return stable_step(*settings_.method); }
+  double stable_step(const Method& method) const override;
+  MotionFacts motion_facts() const override;
 
   Index size() const override { return points_.size(); }
   Points<double> positions() const override { return world(points_.position); }
@@ -101,7 +107,9 @@ class PointBody : public Body, protected Dynamics<S> {
     Vec3 from, to;  // world
   };
 
+  bool adapts() const { return settings_.dt == 0 && settings_.method->adaptive(); }
   typename ForceField<S>::Rates rate_bounds() const;
+  double automatic_step() const;
   void choose_substeps(const Tick& tick);
   void spend_bank(double seconds);
   void hold_fields(double t);

@@ -42,6 +42,17 @@ PointMasses<S> point(const Vec3& x, const Vec3& v) {
   return points<S>(rows({x}), rows({v}), Values<double>::Ones(1));
 }
 
+/// Those of methods() that take drag and dampers.
+inline std::vector<const Method*> damped_methods() {
+  std::vector<const Method*> out;
+  for (const Method* method : methods())
+    if (method->accepts_velocity_forces) out.push_back(method);
+  return out;
+}
+
+/// True where a step is solved to a tolerance instead of computed.
+inline bool solves(const Method& method) { return std::holds_alternative<Implicit>(method.scheme); }
+
 inline MotionSettings motion(const Method& method, double dt = 0) {
   MotionSettings settings;
   settings.method = &method;

@@ -45,7 +45,7 @@ TYPED_TEST(Rest, OfAClothThatLiesHoweverStaysBitwiseAtRest) {
     auto cloth = softbody::cloth_from_grid(1, 1.3, 9, 12, q * Vec3::UnitX(), q * Vec3::UnitZ(), {});
     if (turn > 0) cloth.positions.rowwise() += random.vector(3).transpose().array();
     const Index n = cloth.positions.rows();
-    for (const Method* method : methods()) {
+    for (const Method* method : damped_methods()) {
       SCOPED_TRACE(method->name);
       auto body = body_of(points<S>(cloth.positions, Points<double>::Zero(n, 3), cloth.masses), motion(*method));
       body->add_field(std::make_unique<SpringField<S>>(cloth.network, body->state().position));
@@ -100,7 +100,7 @@ TYPED_TEST(Rest, UnderGravityDoesNotDependOnMass) {
     ASSERT_TRUE(run(*body, 0.01, 100, {0, -9.81, 0}).good());
     const Points<double> x = body->positions();
     for (Index i = 1; i < n; ++i) {
-      if (method == &implicit_euler())
+      if (solves(*method))
         EXPECT_NEAR(x(i, 1), x(0, 1), 200 * kUnit<S>);  // solved, not computed
       else
         EXPECT_EQ(x(i, 1), x(0, 1));
@@ -112,7 +112,7 @@ TYPED_TEST(Rest, UnderGravityDoesNotDependOnMass) {
 
 TYPED_TEST(Rest, OfAnImmovablePointIsBrokenByNothing) {
   using S = TypeParam;
-  for (const Method* method : methods()) {
+  for (const Method* method : damped_methods()) {
     SCOPED_TRACE(method->name);
     World world(120);
     world.set_damping(0.3);
