@@ -120,7 +120,7 @@ const Method& blanes_moan_6() {
       "blanes-moan-6",
       6,
       true,
-      3.1415,
+      3.1414,
       11,
       false,
       symmetric_kicks(

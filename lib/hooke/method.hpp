@@ -112,7 +112,7 @@ const Method& rkn4();
 const Method& blanes_moan_4();
 
 /// Blanes and Moan's splitting of eleven stages (SRKN11b), kick first. Order 6, symplectic,
-/// time-reversible. Stable for ωh < 3.141; beyond it two narrow windows, 3.1415-3.1424 and
+/// time-reversible. Stable for ωh < 3.141; beyond it two narrow windows, 3.1414-3.1424 and
 /// 6.348-6.350, grow by at most 1.0007 a step, and 9.073 is the end. 11 evaluations (the last is the next
 /// step's first). Forces of position and time only. Source: as blanes_moan_4.
 const Method& blanes_moan_6();

@@ -115,7 +115,7 @@ Window window_of(const Method& method) {
     case 2:
       return {200, 4};
     case 4:
-      return {64, 3};
+      return {64, 4};
     case 5:
       return {64, 3};
     default:
