@@ -86,6 +86,8 @@ class PointBody : public Body, protected Dynamics<S> {
   virtual SolveResult substep(double t, double h);
 
   void check(Index point) const;
+  /// True where fields or pushes add to gravity in this tick.
+  bool other_forces() const { return !fields_.empty() || pushing_; }
   Points<double> world(const Points<S>& p) const;
 
   PointMasses<S> points_;

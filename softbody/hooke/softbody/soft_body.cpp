@@ -21,9 +21,14 @@ std::unique_ptr<Body> make(const SoftBodySettings& s) {
   points.velocity = s.velocities.rows() ? Points<S>(s.velocities.cast<S>()) : Points<S>(Points<S>::Zero(n, 3));
   points.mass = s.masses.cast<S>();
   points.inverse_mass = points.mass.inverse();
-  auto body = std::make_unique<PointBody<S>>(s.name, std::move(points), s.motion);
+  const bool filtered = s.motion.method == &filtered_leapfrog();
+  if (s.wanted_error != 0 && !filtered)
+    throw std::invalid_argument("body \"" + s.name + "\": only filtered-leapfrog takes a wanted error, got method " +
+                                std::string(s.motion.method->name));
+  auto body = filtered ? make_filtered_sheet(s.name, std::move(points), s.motion, s.network, s.wanted_error)
+                       : std::make_unique<PointBody<S>>(s.name, std::move(points), s.motion);
   for (const Index pin : s.pins) body->pin(pin);
-  if (s.network && !s.network->springs.empty())
+  if (!filtered && s.network && !s.network->springs.empty())
     body->add_field(std::make_unique<SpringField<S>>(s.network, body->state().position));
   if (s.wind) body->add_field(std::make_unique<WindField<S>>(*s.wind, s.triangles, n));
   if (s.linear_drag != 0) body->add_field(std::make_unique<LinearDrag<S>>(s.linear_drag));

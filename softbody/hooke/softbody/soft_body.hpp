@@ -3,6 +3,7 @@
 
 #include <hooke/point_body.hpp>
 #include <hooke/softbody/cloth.hpp>
+#include <hooke/softbody/filtered_leapfrog.hpp>
 #include <hooke/softbody/wind.hpp>
 
 #include <optional>
@@ -24,7 +25,8 @@ struct SoftBodySettings {
   std::optional<Wind> wind;                      ///< absent: no air at all
   double linear_drag = 0;                        ///< on every point [N·s/m]
   double quadratic_drag = 0;                     ///< on every point [N·s²/m²]
-  MotionSettings motion;
+  MotionSettings motion;                         ///< method: those of method.hpp, or filtered_leapfrog()
+  double wanted_error = 0;                       ///< of filtered leapfrog [m]; may lower the stiffness; 0: none
   Precision precision = Precision::Float;
 };
 

@@ -1,0 +1,124 @@
+// The body that filtered leapfrog moves: what it decides when it is made, and its step.
+// Internal to hooke::softbody and not installed.
+#pragma once
+
+#include <hooke/softbody/filtered_grid.hpp>
+#include <hooke/softbody/filtered_leapfrog.hpp>
+#include <hooke/softbody/spring_field.hpp>
+
+#include <Eigen/LU>
+
+namespace hooke::softbody {
+
+/// Grid, masses, stiffness and step of a sheet.
+struct SheetPlan {
+  SpringGrid grid;
+  MassModel mass_model;
+  std::shared_ptr<const SpringNetwork> network;  ///< with the stiffness that is used
+  double width = 0, height = 0;                  ///< [m], at rest
+  double speed_x = 0, speed_y = 0;               ///< of waves along rows and columns [m/s]
+  double stiffness_scale = 1, cap_error = 0;     ///< [1], [m]
+  double step = 0;                               ///< wanted [s]
+
+  SheetPlan(std::shared_ptr<const SpringNetwork> given, const Points<double>& start, const Values<double>& mass,
+            double dt, double wanted_error);
+
+  struct LineStiffness {
+    double x = 0, y = 0;  // [1/s²]
+  };
+  LineStiffness line_stiffness(double h) const;
+  double extension_under_weight(const Values<double>& mass) const;
+  double travel(double h) const;
+  double expected_error(double h) const;
+};
+
+template <class S>
+class FilteredSheet final : public PointBody<S> {
+ public:
+  FilteredSheet(std::string name, PointMasses<S> points, const MotionSettings& settings, SheetPlan plan);
+
+  FilteredFacts facts() const;
+  double kept_energy(const Vec3& gravity) const;
+
+  Energy energy(const Vec3& gravity) const override;
+  void set_position(Index point, const Vec3& position) override;
+  void pin(Index point) override;
+  void release(Index point) override;
+  void drive_pins(std::vector<Index> points, PinMotion motion) override;
+  void take_back() override;
+
+ protected:
+  SolveResult substep(double t, double h) override;
+
+ private:
+  using Base = PointBody<S>;
+  using Base::points_;
+  using Base::tick_;
+  struct Special {  // a point with a mass or hold of its own
+    Index point, row, column;
+    std::size_t row_number, column_number;  // in special_rows_, special_columns_
+    bool held;
+    double extra;  // mass in units, 0 where held
+  };
+  struct Line {  // factors of a LineFilter, in S
+    Values<S> below, below2, above, above2, inverse_pivot;
+  };
+
+  void lay_out_springs();
+  void prepare(double h, bool contacts);
+  void find_held();
+  void prepare_specials();
+  static Line line_of(const LineFilter& filter, Index padded);
+  void meet_pins(double t, double h);
+  void gather_extra(double t, double h);
+  void forward(double h);
+  void pull_row(Index row);
+  void right_side(Index row, double h);
+  void solve_specials(double kick);
+  void back(double kick, double drift);
+  void follow_pins(Index row, double kick);
+  void finish_pins();
+  void move_row(Index row, S kick, S drift);
+  double followed(Index row, Index column, int k) const;
+  bool needs_velocity() const { return damped_ || this->uses_velocity(); }
+  S* row_of(Index row) { return z_.data() + row * stride_; }
+
+  SheetPlan plan_;
+  SpringField<S> field_;                // for energy and bounds
+  bool damped_ = false, even_ = false;  // even: no mass differs
+  Index rows_, columns_, stride_, padded_rows_, plane_;
+  std::vector<S> parameters_;                                // rows of stiffness, rest length, its square and damping
+  std::array<std::vector<std::size_t>, kDirections> first_;  // by row: where they are
+
+  // Of the present step, pins and contacts.
+  bool stale_ = true;  // pins have changed
+  double h_ = 0;
+  bool contacts_ = false, filtered_ = false;
+  std::optional<LineFilter> along_rows_, along_columns_;
+  Line row_line_, column_line_;
+  std::vector<bool> held_row_, held_column_;
+  std::vector<Index> pins_;        // all held points
+  std::vector<Special> specials_;  // by point
+  std::vector<Index> special_rows_, special_columns_;
+  std::vector<Values<double>> row_response_, column_response_;  // along rows and columns, of a unit at a special one
+  Eigen::PartialPivLU<Eigen::MatrixXd> special_matrix_;
+  Eigen::Matrix<double, Eigen::Dynamic, 3> special_kick_;
+  Points<S> special_place_;
+  std::vector<S> special_sums_;  // by special row, three coordinates
+
+  // Of the present substep.
+  Index substep_ = 0;
+  bool known_ = false;  // z_ is the kick of the coming tick's start
+  Vec3 known_gravity_{0, 0, 0};
+  bool extra_on_ = false, jumps_ = false;
+  std::vector<S> z_;  // kicks: three planes of rows, then a row of zeros and two that wait
+  std::vector<S> scratch_, last_row_, mass_row_, block_;
+  Points<S> extra_, predicted_, from_, touched_x_, touched_v_;
+  Points<S> place_x_, place_v_, pin_velocity_, jump_;  // where there are moving pins; only their rows count
+  std::vector<Points<S>> column_jump_;                 // by held column, along it
+};
+
+extern template class FilteredSheet<float>;
+extern template class FilteredSheet<double>;
+
+}  // namespace hooke::softbody
