@@ -7,6 +7,7 @@
 #include <filesystem>
 #include <optional>
 #include <string>
+#include <vector>
 
 namespace hooke::command {
 
@@ -27,6 +28,14 @@ struct RenderOptions {
 int render(const RenderOptions& options);
 
 int validate(const std::string& scene);
+
+struct ReportOptions {
+  std::vector<std::string> scenes;  ///< names of standard scenes; empty: all
+  std::filesystem::path out;        ///< folder for report.csv, report.html and pictures
+  bool quick = false;               ///< a look: seconds a scene, the largest left out
+  std::optional<double> budget;     ///< processor time a scene [s]
+};
+int report(const ReportOptions& options);
 
 int list();
 

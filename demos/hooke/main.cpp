@@ -25,6 +25,7 @@ int tell(int code, std::string text) {
 struct Arguments {
   SimulateOptions simulate;
   RenderOptions render;
+  ReportOptions report;
   std::string validate_scene, size;
   bool resume = false, list = false;
 };
@@ -88,6 +89,15 @@ int dispatch(int argc, char** argv) {
   validate_command->add_option("scene", a.validate_scene, "Scene file, or the name of a scene")->required();
   validate_command->footer("Example: hooke validate my-scene.json");
 
+  CLI::App* report_command =
+      app.add_subcommand("report", "Speed against error of every method and precision on the standard scenes");
+  report_command->add_option("scene", a.report.scenes, "Names of standard scenes; all if none is given");
+  report_command->add_option("--out", a.report.out, "Folder for report.csv, report.html and pictures")->required();
+  report_command->add_flag("--quick", a.report.quick, "Under a minute: few repeats, coarse steps, no large scenes");
+  report_command->add_option("--budget", a.report.budget,
+                             "Processor time a scene [s], and once more for its reference");
+  report_command->footer("Example: hooke report hanging-sheet-32 --budget 20 --out report");
+
   CLI::App* list_command = app.add_subcommand("list", "The scenes that have a name");
   list_command->footer("Example: hooke list");
   app.require_subcommand(0, 1);
@@ -111,9 +121,10 @@ int dispatch(int argc, char** argv) {
       throw Error("--supersample must be from 1 to 4, got " + std::to_string(a.render.supersample));
     return render(a.render);
   }
+  if (report_command->parsed()) return report(a.report);
   if (validate_command->parsed()) return validate(a.validate_scene);
   if (list_command->parsed() || a.list) return list();
-  return tell(kBadInput, "a command is needed: simulate, render, validate or list (hooke --help)");
+  return tell(kBadInput, "a command is needed: simulate, render, validate, report or list (hooke --help)");
 }
 
 }  // namespace

@@ -198,6 +198,7 @@ class Builder {
     settings.quadratic_drag = description.quadratic_drag;
     settings.motion.thickness = description.thickness;
     settings.motion.dt = description.solver.dt;
+    settings.motion.tolerance = description.solver.tolerance;
     settings.motion.method = &method_named(description.solver.method);
     settings.precision = description.solver.precision;
 

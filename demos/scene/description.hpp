@@ -66,7 +66,8 @@ using Material = std::variant<softbody::ClothMaterial, FixedMaterial>;
 
 struct Solver {
   std::string method = "velocity-verlet";
-  double dt = 0;  ///< [s]; 0: automatic
+  double dt = 0;            ///< [s]; 0: automatic
+  double tolerance = 1e-6;  ///< of adaptive methods with dt = 0 [m], as MotionSettings::tolerance
   softbody::Precision precision = softbody::Precision::Float;
 };
 

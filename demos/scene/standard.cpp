@@ -1,6 +1,7 @@
 #include <scene/standard.hpp>
 
 #include <hooke/linear_bodies.hpp>
+#include <scene/fput.hpp>
 #include <scene/scene.hpp>
 
 #include <cmath>
@@ -177,6 +178,7 @@ MotionSettings motion_of(const Solver& solver) {
   MotionSettings motion;
   motion.method = &method_named(solver.method);
   motion.dt = solver.dt;
+  motion.tolerance = solver.tolerance;
   return motion;
 }
 
@@ -276,6 +278,28 @@ StandardScene stiff_pendulum() {
                    "One kilogram in a gravity of 1 m/s² is let go level with the pin of a spring that is 1 m long and "
                    "1000 N/m stiff. The spring trembles thirty times while the pendulum swings once.",
                    100);
+}
+
+StandardScene fput_chain() {
+  constexpr double kDuration = 10;
+  constexpr int kTicks = 100;
+  StandardScene scene;
+  scene.name = "fput-chain";
+  scene.title = "Chain of stiff and soft springs (Fermi, Pasta, Ulam, Tsingou)";
+  scene.problem =
+      "Six points between two walls, joined by three stiff linear springs (50 rad/s) and four soft quartic ones, as in "
+      "Hairer, Lubich and Wanner. The fast vibration wanders from one stiff spring to the next. At 10 s its energies "
+      "should be 0.956065, 0.025681 and 0.000198 J.";
+  scene.duration = kDuration;
+  scene.ticks = kTicks;
+  scene.build = [](const Solver& solver) {
+    World world(kTicks / kDuration);
+    world.set_gravity({0, 0, 0});
+    world.add(in_precision(solver,
+                           [&](auto s) -> std::unique_ptr<Body> { return fput_body<decltype(s)>(motion_of(solver)); }));
+    return world;
+  };
+  return scene;
 }
 
 StandardScene tumbling_net() {
@@ -400,7 +424,7 @@ SceneDescription hanging_sheet(int n) {
 std::vector<StandardScene> standard_scenes() {
   std::vector<StandardScene> out;
   for (const auto& make : {oscillator, throw_with_linear_drag, throw_with_quadratic_drag, ship, bouncing_ball,
-                           elastic_pendulum, stiff_pendulum, tumbling_net, jelly_in_flight})
+                           elastic_pendulum, stiff_pendulum, fput_chain, tumbling_net, jelly_in_flight})
     out.push_back(make());
   for (const int n : {32, 64, 128}) out.push_back(sheet(n));
   for (const auto& make : {stiff_sheet, sheet_over_sphere, settling_cloth}) out.push_back(make());

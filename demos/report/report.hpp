@@ -1,0 +1,61 @@
+// What is made of measured scenes: a table, a page, pictures, and conclusions that follow from the
+// rows alone.
+#pragma once
+
+#include "measure.hpp"
+
+#include <hooke/io/output_file.hpp>
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+namespace hooke::report {
+
+/// Where and by what it was measured.
+struct Machine {
+  std::string cpu, compiler, version, commit, bullet;
+  std::string command;  ///< that repeats the run
+};
+Machine this_machine();
+
+/// The rows that no other beats in both time and error, cheapest first. Errors below the reference's
+/// uncertainty count as that.
+std::vector<const Row*> pareto(const SceneReport& report);
+
+/// The cheapest row whose error is at most `error` [m].
+struct Cheapest {
+  double error = 0;
+  const Row* row = nullptr;  ///< none gets there
+};
+/// For 1e-1, 1e-2, … 1e-8 m. With `method`, of its rows alone.
+std::vector<Cheapest> cheapest(const SceneReport& report, const std::string& method = "");
+
+/// What the rows say, a sentence each.
+std::vector<std::string> conclusions(const SceneReport& report);
+
+/// "velocity-verlet, float" and what else was set.
+std::string name_of(const Row& row);
+
+/// "#1f77b4": every method has its own colour, the same in all plots.
+std::string color_of(const std::string& method);
+
+/// report.csv: a line a row, 17 digits, empty where nothing was measured.
+class Table {
+ public:
+  explicit Table(const std::filesystem::path& path);
+  void add(const SceneReport& report, const Machine& machine);
+  void finish() { file_.commit(); }
+
+ private:
+  io::OutputFile file_;
+};
+
+/// One page that needs nothing but a browser.
+std::string page(const std::vector<SceneReport>& reports, const Machine& machine);
+
+/// A picture of a scene's plot, 1200 × 800 pixels, drawn by gnuplot.
+/// @return why there is no picture, or nullptr
+const char* draw(const SceneReport& report, const std::filesystem::path& png);
+
+}  // namespace hooke::report
