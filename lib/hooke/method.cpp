@@ -135,7 +135,7 @@ const Method& implicit_midpoint() {
 }
 
 const Method& linearised_midpoint() {
-  static const Method method{"linearised-midpoint", 2, false, kAlways, 1, true, Implicit{1e-9, 1, 0.5, true}};
+  static const Method method{"linearised-midpoint", 2, false, kAlways, 1, true, Implicit{1e-6, 1, 0.5, true}};
   return method;
 }
 

@@ -124,9 +124,10 @@ const Method& blanes_moan_6();
 const Method& implicit_midpoint();
 
 /// The implicit midpoint rule with one Newton step from (x + ½ h v, v): one evaluation and one
-/// solve by conjugate gradients. Order 2, the same as implicit midpoint for linear forces; for
-/// others it keeps energy only approximately. Source: linearly implicit methods, Hairer, Wanner, "Solving
-/// Ordinary Differential Equations II", IV.7; Baraff, Witkin 1998 do the same to backward Euler.
+/// solve by conjugate gradients, which stop at a millionth of the step's change. Order 2, the same as
+/// implicit midpoint for linear forces; for others it keeps energy only approximately, and fails
+/// where a step is too long for one Newton step. Source: linearly implicit methods, Hairer, Wanner,
+/// "Solving Ordinary Differential Equations II", IV.7; Baraff, Witkin 1998 do it to backward Euler.
 const Method& linearised_midpoint();
 
 /// The embedded pair 5(4) of Dormand and Prince with error control: chooses its own steps within a
