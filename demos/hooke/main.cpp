@@ -94,8 +94,9 @@ int dispatch(int argc, char** argv) {
   report_command->add_option("scene", a.report.scenes, "Names of standard scenes; all if none is given");
   report_command->add_option("--out", a.report.out, "Folder for report.csv, report.html and pictures")->required();
   report_command->add_flag("--quick", a.report.quick, "Under a minute: few repeats, coarse steps, no large scenes");
-  report_command->add_option("--budget", a.report.budget,
-                             "Processor time a scene [s], and once more for its reference");
+  report_command->add_option(
+      "--budget", a.report.budget,
+      "Processor time a scene [s], three times that for large ones; its reference may take as much");
   report_command->footer("Example: hooke report hanging-sheet-32 --budget 20 --out report");
 
   CLI::App* list_command = app.add_subcommand("list", "The scenes that have a name");

@@ -29,7 +29,7 @@ std::vector<scene::StandardScene> chosen_scenes(const ReportOptions& options) {
 
 report::Effort effort_of(const ReportOptions& options) {
   report::Effort effort;
-  if (options.quick) effort = {2, 0.01};
+  if (options.quick) effort = {1.5, 0.005};
   if (!options.budget) return effort;
   if (!(*options.budget > 0 && std::isfinite(*options.budget)))
     throw Error("--budget must be positive [s], got " + std::to_string(*options.budget));

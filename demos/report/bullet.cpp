@@ -82,7 +82,7 @@ std::vector<Series> bullet_classic(const PlainSprings& scene) {
   if (scene.triangles.empty()) return out;  // sheets only
   for (const int iterations : {1, 5, 20}) {
     Series series;
-    series.name = "bullet-classic, " + std::to_string(iterations) + " iterations";
+    series.name = "bullet-classic with piterations = " + std::to_string(iterations);
     series.levels = 8;
     series.run = [scene, iterations](int level, int, double) {
       const int steps = int(std::lround(scene.duration * 60)) << level;

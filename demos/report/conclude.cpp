@@ -3,13 +3,16 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <limits>
 #include <map>
+#include <set>
 
 namespace hooke::report {
 
 namespace {
 
 constexpr int kDecades = 8;
+constexpr double kEqualTime = 1.05;
 
 template <class... Values>
 std::string format(const char* pattern, Values... values) {
@@ -17,9 +20,6 @@ std::string format(const char* pattern, Values... values) {
   std::snprintf(text, sizeof text, pattern, values...);
   return text;
 }
-
-// "1e-3": a power of ten without the leading zero of its exponent.
-std::string decade(double error) { return format("1e%d", int(std::lround(std::log10(error)))); }
 
 bool is_rival(const Row& row) { return row.method == "yardstick" || row.method == "bullet-classic"; }
 
@@ -35,8 +35,9 @@ void tell_winners(const SceneReport& report, std::vector<std::string>& out) {
   for (std::size_t i = 0; i < table.size();) {
     std::size_t j = i;
     while (j + 1 < table.size() && table[j + 1].row == table[i].row) ++j;
-    const std::string range = i == j ? "an error of " + decade(table[i].error) + " m"
-                                     : "errors of " + decade(table[i].error) + " to " + decade(table[j].error) + " m";
+    const std::string range =
+        i == j ? "an error of " + power_of_ten(table[i].error) + " m"
+               : "errors of " + power_of_ten(table[i].error) + " to " + power_of_ten(table[j].error) + " m";
     if (const Row* row = table[i].row) {
       out.push_back(format("For %s the cheapest is %s at %s: %.3g s per simulated second, error %.2g m.", range.c_str(),
                            name_of(*row).c_str(), step_of(*row).c_str(), row->seconds, row->rms));
@@ -44,7 +45,7 @@ void tell_winners(const SceneReport& report, std::vector<std::string>& out) {
       out.push_back(format("Below %.2g m the reference itself is uncertain: nothing is said about %s.",
                            report.reference.uncertainty(), range.c_str()));
     } else {
-      out.push_back(format("No run reached %s.", range.c_str()));
+      out.push_back(format("No run reached %s within the budget.", range.c_str()));
     }
     i = j + 1;
   }
@@ -65,14 +66,16 @@ void tell_rival(const SceneReport& report, const std::string& rival, std::vector
     if (from == 0) from = ours[i].error;
     to = ours[i].error;
   }
+  const std::string range =
+      from == to ? "an error of " + power_of_ten(from) : "errors of " + power_of_ten(from) + " to " + power_of_ten(to);
   if (from == 0) {
     out.push_back("The " + rival + " reached no error of the table.");
-  } else if (from == to) {
-    out.push_back(format("At an error of %s m Hooke's cheapest is %.3g times as fast as the %s.", decade(from).c_str(),
-                         least, rival.c_str()));
+  } else if (from == to || format("%.3g", least) == format("%.3g", most)) {
+    out.push_back(format("At an error of %s m Hooke's cheapest is %.3g times as fast as the %s.",
+                         power_of_ten(from).c_str(), least, rival.c_str()));
   } else {
-    out.push_back(format("At errors of %s to %s m Hooke's cheapest is %.3g to %.3g times as fast as the %s.",
-                         decade(from).c_str(), decade(to).c_str(), least, most, rival.c_str()));
+    out.push_back(format("At %s m Hooke's cheapest is %.3g to %.3g times as fast as the %s.", range.c_str(), least,
+                         most, rival.c_str()));
   }
 }
 
@@ -109,26 +112,41 @@ void tell_energy(const SceneReport& report, std::vector<std::string>& out) {
              name_of(*most).c_str(), step_of(*most).c_str()));
 }
 
+// A series begins at twice its largest stable step, where it should fail: more than that is worth a word.
 void tell_failures(const SceneReport& report, std::vector<std::string>& out) {
-  for (const char* status : {"blow-up", "not converged"}) {
-    std::vector<std::pair<std::string, std::pair<int, int>>> failed;  // name, (failed, all)
-    for (const Row& row : report.rows) {
-      const std::string name = row.method + ", " + row.precision + (row.setting.empty() ? "" : ", " + row.setting);
-      auto known = std::find_if(failed.begin(), failed.end(), [&](const auto& f) { return f.first == name; });
-      if (known == failed.end()) known = failed.insert(failed.end(), {name, {0, 0}});
-      known->second.first += row.status == status;
-      ++known->second.second;
-    }
-    std::string text;
-    for (const auto& [name, counts] : failed)
-      if (counts.first > 0)
-        text += format("%s%s (%d of %d runs)", text.empty() ? "" : "; ", name.c_str(), counts.first, counts.second);
-    if (text.empty()) continue;
-    out.push_back((std::string(status) == "blow-up" ? "Blew up: " : "Did not converge: ") + text + ".");
+  struct Count {
+    std::string method;
+    std::set<std::string> series;
+    int runs = 0, blown_up = 0, not_converged = 0;
+  };
+  std::vector<Count> counts;
+  for (const Row& row : report.rows) {
+    auto known = std::find_if(counts.begin(), counts.end(), [&](const Count& c) { return c.method == row.method; });
+    if (known == counts.end()) known = counts.insert(counts.end(), {row.method, {}});
+    known->series.insert(name_of(row));
+    ++known->runs;
+    known->blown_up += row.status == "blow-up";
+    known->not_converged += row.status == "not converged";
   }
+  std::string expected, blown_up, not_converged;
+  const auto add = [](std::string& text, const std::string& more) { text += (text.empty() ? "" : ", ") + more; };
+  for (const Count& c : counts) {
+    if (c.blown_up > int(c.series.size()))
+      add(blown_up, format("%s (%d of %d runs)", c.method.c_str(), c.blown_up, c.runs));
+    else if (c.blown_up > 0)
+      add(expected, c.method);
+    if (c.not_converged > 0)
+      add(not_converged, format("%s (%d of %d runs)", c.method.c_str(), c.not_converged, c.runs));
+  }
+  if (!blown_up.empty()) out.push_back("Blew up: " + blown_up + ".");
+  if (!expected.empty())
+    out.push_back("Blew up at the coarsest step alone, which is twice the stable one: " + expected + ".");
+  if (!not_converged.empty()) out.push_back("Did not converge: " + not_converged + ".");
 }
 
 }  // namespace
+
+std::string power_of_ten(double value) { return format("1e%d", int(std::lround(std::log10(value)))); }
 
 std::string name_of(const Row& row) {
   return row.method + " in " + row.precision + (row.setting.empty() ? "" : " with " + row.setting);
@@ -149,10 +167,14 @@ std::vector<Cheapest> cheapest(const SceneReport& report, const std::string& met
   for (int decade = 1; decade <= kDecades; ++decade) {
     Cheapest entry;
     entry.error = std::pow(10.0, -decade);
+    std::vector<const Row*> there;
     for (const Row& row : report.rows)
-      if (row.ok() && error_of(report, row) <= entry.error && (method.empty() || row.method == method) &&
-          (!entry.row || row.seconds < entry.row->seconds))
-        entry.row = &row;
+      if (row.ok() && error_of(report, row) <= entry.error && (method.empty() || row.method == method))
+        there.push_back(&row);
+    double least = std::numeric_limits<double>::infinity();
+    for (const Row* row : there) least = std::min(least, row->seconds);
+    for (const Row* row : there)
+      if (row->seconds <= kEqualTime * least && (!entry.row || row->rms < entry.row->rms)) entry.row = row;
     out.push_back(entry);
   }
   return out;

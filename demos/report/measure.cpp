@@ -4,6 +4,7 @@
 
 #include <hooke/error.hpp>
 #include <hooke/method.hpp>
+#include <hooke/softbody/filtered_leapfrog.hpp>
 
 #include <algorithm>
 #include <cmath>
@@ -141,7 +142,9 @@ Solver solver_of(const Method& method, Precision precision, double dt) {
 std::vector<Series> contenders(const StandardScene& scene, const Scales& scales, double size,
                                std::vector<std::string>& notes) {
   std::vector<Series> out;
-  for (const Method* method : methods())
+  std::vector<const Method*> every(methods().begin(), methods().end());
+  every.push_back(&softbody::filtered_leapfrog());  // for grids alone
+  for (const Method* method : every)
     for (const auto& [precision, precision_name] : kPrecisions) {
       const double tick = duration_tick(scene);
       int first = 1;
@@ -293,8 +296,10 @@ Points<double> compared(const StandardScene& scene, const Points<double>& positi
   return out;
 }
 
-SceneReport measure(const StandardScene& scene, const Effort& effort,
+SceneReport measure(const StandardScene& scene, const Effort& wanted,
                     const std::function<void(double done)>& progress) {
+  Effort effort = wanted;
+  if (scene.large) effort.budget *= 3;
   SceneReport report;
   report.scene = scene;
   // A first look for scales that no method under test decides.
@@ -330,12 +335,11 @@ SceneReport measure(const StandardScene& scene, const Effort& effort,
     int level = 0;
     double spent = 0, last_cpu = 0, best = std::numeric_limits<double>::infinity();
     int idle = 0;  // levels since it got better
-    bool done = false;
+    bool done = false, cut = false;
     std::vector<Row> rows;
   };
   std::vector<State> states(all.size());
   double spent = 0;
-  std::vector<std::string> cut;
   const double floor = std::max(report.reference.uncertainty(), 1e-14 * report.size);
   for (;;) {
     std::size_t i = all.size();
@@ -362,16 +366,13 @@ SceneReport measure(const StandardScene& scene, const Effort& effort,
       if (++state.level == all[i].levels) state.done = true;
       progress(0.1 + 0.9 * std::min(1.0, spent / effort.budget));
     }
-    if (!too_long) continue;
-    cut.push_back(all[i].name);
-    state.done = true;
+    if (too_long) state.done = state.cut = true;
   }
   for (State& state : states) report.rows.insert(report.rows.end(), state.rows.begin(), state.rows.end());
-  if (!cut.empty()) {
-    std::string names;
-    for (const std::string& name : cut) names += (names.empty() ? "" : "; ") + name;
-    report.notes.push_back("The budget ended these before their errors did: " + names + ".");
-  }
+  std::string cut;
+  for (std::size_t i = 0; i < all.size(); ++i)
+    if (states[i].cut) cut += (cut.empty() ? "" : "; ") + all[i].name;
+  if (!cut.empty()) report.notes.push_back("The budget ended these before their errors did: " + cut + ".");
   progress(1);
   return report;
 }

@@ -47,8 +47,10 @@ struct SceneReport {
 
 /// How much time to spend.
 struct Effort {
-  double budget = 45;   ///< processor time for the runs of a scene, and once more for its reference [s]
-  double repeat = 0.2;  ///< short runs are repeated for this long [s]
+  /// Processor time for the runs of a scene, and at most once more for its reference [s]; three times that where
+  /// the scene is large.
+  double budget = 30;
+  double repeat = 0.06;  ///< short runs are repeated for this long [s]
   bool operator==(const Effort&) const = default;
 };
 

@@ -100,7 +100,7 @@ std::string cheapest_table(const SceneReport& report) {
       "<div class=wide><table><tr><th>error at most [m]<th class=word>cheapest method<th class=word>precision<th>dt "
       "[s]<th>s per simulated s<th>its error [m]<th>energy drift</tr>\n";
   for (const Cheapest& entry : cheapest(report)) {
-    out += "<tr><td>" + number(entry.error, "%.0e") + "</td>";
+    out += "<tr><td>" + power_of_ten(entry.error) + "</td>";
     if (entry.row)
       out += method_cell(*entry.row) + step_cell(*entry.row) + "<td>" + number(entry.row->seconds) + "</td><td>" +
              number(entry.row->rms, "%.2g") + "</td><td>" + number(entry.row->energy_drift, "%.1e") + "</td>";
@@ -168,8 +168,12 @@ std::string section(const SceneReport& report, const Machine& machine) {
   out += "<h3>Problem</h3><p>" + escaped(scene.problem) + "</p>\n";
   out += "<h3>Reference</h3><p>" + escaped(report.reference.text) + "</p>\n";
   out += "<h3>Set-up</h3>" + set_up(report);
-  out += "<h3>Error against time</h3>\n<div class=tools id=\"tools-" + scene.name +
-         "\"></div>\n<div class=plot id=\"plot-" + scene.name + "\"></div>\n";
+  out += "<h3>Error against time</h3>\n";
+  if (pareto(report).empty())
+    out += "<p>No run gave an answer: there is nothing to draw.</p>\n";
+  else
+    out += "<div class=tools id=\"tools-" + scene.name + "\"></div>\n<div class=plot id=\"plot-" + scene.name +
+           "\"></div>\n";
   out += cheapest_table(report) + all_rows(report);
   out += "<h3>Conclusion</h3><ul class=conclusion>";
   for (const std::string& sentence : conclusions(report)) out += "<li>" + escaped(sentence) + "</li>\n";

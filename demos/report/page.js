@@ -37,7 +37,7 @@
         mode: "lines+markers", name: series.method, legendgroup: series.method, showlegend: first,
         meta: series.precision,
         line: { color: series.color, width: 1.8, dash: dashes[series.precision] || "solid" },
-        marker: { color: series.color, size: 8, symbol: symbols[series.precision] || "diamond", line: { width: 1.8 } }
+        marker: { color: series.color, size: 8, symbol: symbols[series.precision] || "diamond", line: { width: 1.8, color: series.color } }
       });
     });
     return out;
@@ -94,7 +94,8 @@
 
   data.scenes.forEach(function (scene) {
     var plot = document.getElementById("plot-" + scene.name);
-    Plotly.newPlot(plot, traces(scene), layout(scene), { responsive: true, displaylogo: false,
+    if (!plot) return; // no run gave an answer
+    Plotly.newPlot(plot, traces(scene), layout(scene), { responsive: true, displaylogo: false, showTips: false,
       modeBarButtonsToRemove: ["select2d", "lasso2d", "autoScale2d"] });
     var precisions = [];
     scene.series.forEach(function (s) { if (precisions.indexOf(s.precision) < 0) precisions.push(s.precision); });

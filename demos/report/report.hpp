@@ -23,7 +23,8 @@ Machine this_machine();
 /// uncertainty count as that.
 std::vector<const Row*> pareto(const SceneReport& report);
 
-/// The cheapest row whose error is at most `error` [m].
+/// The cheapest row whose error is at most `error` [m]. Times within 5 % of each other count as equal: then the
+/// more accurate row.
 struct Cheapest {
   double error = 0;
   const Row* row = nullptr;  ///< none gets there
@@ -34,7 +35,10 @@ std::vector<Cheapest> cheapest(const SceneReport& report, const std::string& met
 /// What the rows say, a sentence each.
 std::vector<std::string> conclusions(const SceneReport& report);
 
-/// "velocity-verlet, float" and what else was set.
+/// "1e-3".
+std::string power_of_ten(double value);
+
+/// "velocity-verlet in float" and what else was set.
 std::string name_of(const Row& row);
 
 /// "#1f77b4": every method has its own colour, the same in all plots.

@@ -55,6 +55,12 @@ softbody::Cloth cloth_of(const Grid& grid, const Material& material) {
   return cloth;
 }
 
+// Of the core, or of soft bodies alone.
+const Method& method_of(const std::string& name) {
+  const Method& filtered = softbody::filtered_leapfrog();
+  return name == filtered.name ? filtered : method_named(name);
+}
+
 struct Lattice {
   int columns = 0, rows = 0;  // 0: none
 };
@@ -199,7 +205,7 @@ class Builder {
     settings.motion.thickness = description.thickness;
     settings.motion.dt = description.solver.dt;
     settings.motion.tolerance = description.solver.tolerance;
-    settings.motion.method = &method_named(description.solver.method);
+    settings.motion.method = &method_of(description.solver.method);
     settings.precision = description.solver.precision;
 
     if (description.wind) {
@@ -289,7 +295,7 @@ Scene build(const SceneDescription& description, const Scene* reuse) { return Bu
 
 void override_solver(SceneDescription& description, const std::string& method, double dt,
                      const std::string& precision) {
-  if (!method.empty()) method_named(method);
+  if (!method.empty()) method_of(method);
   if (!precision.empty() && precision != "float" && precision != "double")
     throw Error("there is no precision \"" + precision + "\"; there are float, double");
   for (SoftBody& body : description.bodies) {

@@ -348,10 +348,13 @@ StandardScene stiff_sheet() {
   d.title = "Stiff hanging sheet, stiffness x 1000";
   auto& material = std::get<FixedMaterial>(d.bodies[0].material);
   for (double* stiffness : {&material.structural, &material.shear, &material.bend}) *stiffness *= 1000;
-  return described(std::move(d),
-                   "The hanging sheet of 32 × 32 points with a thousand times the stiffness: the step is set by motion "
-                   "that nobody sees.",
-                   30);
+  StandardScene scene =
+      described(std::move(d),
+                "The hanging sheet of 32 × 32 points with a thousand times the stiffness: the step is set by motion "
+                "that nobody sees.",
+                30);
+  scene.large = true;
+  return scene;
 }
 
 StandardScene sheet_over_sphere() {
