@@ -46,4 +46,5 @@ hooke_build_packages=(
   libosmesa6-dev libgl-dev libpng-dev ffmpeg               # pictures and film
   assimp-testmodels                                        # a recorded human motion
 )
+hooke_report_packages=(gnuplot-nox libbullet-dev) # pictures and a rival; the report goes on without
 hooke_test_packages=(libgtest-dev libgmock-dev)
