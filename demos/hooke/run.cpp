@@ -163,6 +163,8 @@ std::string chosen(const scene::Scene& scene) {
     out += format("%ld substep%s of %.4g ms a tick of %.4g ms%s\n", long(facts.substeps),
                   facts.substeps == 1 ? "" : "s", 1e3 * tick / double(std::max<Index>(facts.substeps, 1)), 1e3 * tick,
                   facts.wanted_dt > 0 ? " (dt given)" : " (automatic)");
+    if (const auto filtered = softbody::filtered_facts(*body.body))
+      out += body.body->name() + ": " + filtered->text() + "\n";
     if (facts.wanted_dt > 0 && facts.stable_step > 0 &&
         tick / double(std::max<Index>(facts.substeps, 1)) > facts.stable_step)
       out += format("%s: warning: the step is above the largest stable one, %.4g ms\n", body.body->name().c_str(),

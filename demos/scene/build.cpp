@@ -206,6 +206,7 @@ class Builder {
     settings.motion.dt = description.solver.dt;
     settings.motion.tolerance = description.solver.tolerance;
     settings.motion.method = &method_of(description.solver.method);
+    settings.wanted_error = description.solver.wanted_error;
     settings.precision = description.solver.precision;
 
     if (description.wind) {
@@ -300,6 +301,7 @@ void override_solver(SceneDescription& description, const std::string& method, d
     throw Error("there is no precision \"" + precision + "\"; there are float, double");
   for (SoftBody& body : description.bodies) {
     if (!method.empty()) body.solver.method = method;
+    if (dt > 0 || body.solver.method != softbody::filtered_leapfrog().name) body.solver.wanted_error = 0;
     if (dt > 0) body.solver.dt = dt;
     if (!precision.empty())
       body.solver.precision = precision == "float" ? softbody::Precision::Float : softbody::Precision::Double;

@@ -218,8 +218,15 @@ Solver read_solver(const Object& object) {
   Solver solver;
   std::vector<std::string> names;
   for (const Method* method : methods()) names.emplace_back(method->name);
+  names.emplace_back(softbody::filtered_leapfrog().name);
   if (const auto method = object.find("method")) solver.method = method->choice(names);
   solver.dt = object.number("dt", solver.dt, Range::positive(), "s");
+  if (const auto error = object.find("wanted_error")) {
+    if (solver.method != softbody::filtered_leapfrog().name)
+      error->fail("is for filtered-leapfrog, got the method " + solver.method);
+    if (solver.dt > 0) error->fail("excludes dt");
+    solver.wanted_error = error->number(Range::positive(), "m");
+  }
   if (const auto precision = object.find("precision"))
     solver.precision =
         precision->choice({"float", "double"}) == "float" ? softbody::Precision::Float : softbody::Precision::Double;

@@ -35,6 +35,7 @@ TEST(Schema, ListsTheMethodsThereAre) {
   const Json schema = Json::parse(test::contents(kDocs / "scene.schema.json"));
   std::vector<std::string> names;
   for (const Method* method : methods()) names.emplace_back(method->name);
+  names.emplace_back(softbody::filtered_leapfrog().name);
   EXPECT_THAT(schema["$defs"]["solver"]["properties"]["method"]["enum"].get<std::vector<std::string>>(),
               ::testing::UnorderedElementsAreArray(names));
 }

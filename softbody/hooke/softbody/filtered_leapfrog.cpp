@@ -82,6 +82,7 @@ SheetPlan::SheetPlan(std::shared_ptr<const SpringNetwork> given, const Points<do
                                 std::to_string(wanted_error) + " m");
   if (wanted_error > 0 && dt > 0)
     throw std::invalid_argument("filtered-leapfrog: give a step or a wanted error, not both");
+  automatic = dt == 0;
   const std::vector<double> rest = rest_lengths(*given, start);
   const auto measure = [&](Direction along, Index count) {
     double sum = 0;

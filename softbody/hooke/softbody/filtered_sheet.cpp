@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <map>
 #include <stdexcept>
 
@@ -296,6 +297,7 @@ void FilteredSheet<S>::right_side(Index row, double h) {
 // Forces row by row and, behind them, the first half of the solves down the columns.
 template <class S>
 void FilteredSheet<S>::forward(double h) {
+  ++evaluations_;
   const Index last = (rows_ - 1) * columns_;
   for (int k = 0; k < 3; ++k) {
     std::copy_n(points_.position.col(k).data() + last, columns_, last_row_.data() + k * (columns_ + 2));
@@ -493,7 +495,7 @@ SolveResult FilteredSheet<S>::substep(double t, double h) {
   forward(h);
   back(0.5, 0);
   finish_pins();
-  known_ = !extra_on_ && !needs_velocity();
+  known_ = !extra_on_;
   known_gravity_ = tick_.gravity;
   return {};
 }
@@ -535,6 +537,22 @@ double FilteredSheet<S>::kept_energy(const Vec3& gravity) const {
 }
 
 template <class S>
+double FilteredSheet<S>::stable_step(const Method& method) const {
+  if (&method == &filtered_leapfrog()) return std::numeric_limits<double>::infinity();
+  const auto rates = field_.rate_bounds(points_.position, points_.velocity, points_.inverse_mass);
+  return largest_stable_step(method, std::sqrt(rates.omega_squared), rates.gamma);
+}
+
+template <class S>
+MotionFacts FilteredSheet<S>::motion_facts() const {
+  MotionFacts out = Base::motion_facts();
+  out.velocity_forces = needs_velocity();
+  if (plan_.automatic) out.wanted_dt = 0;
+  out.evaluations = evaluations_;
+  return out;
+}
+
+template <class S>
 Energy FilteredSheet<S>::energy(const Vec3& gravity) const {
   Energy energy = Base::energy(gravity);
   energy.elastic += field_.potential_energy(points_.position);
@@ -544,6 +562,12 @@ Energy FilteredSheet<S>::energy(const Vec3& gravity) const {
 template <class S>
 void FilteredSheet<S>::set_position(Index point, const Vec3& position) {
   Base::set_position(point, position);
+  known_ = false;
+}
+
+template <class S>
+void FilteredSheet<S>::set_velocity(Index point, const Vec3& velocity) {
+  Base::set_velocity(point, velocity);
   known_ = false;
 }
 

@@ -19,6 +19,7 @@ struct SheetPlan {
   double speed_x = 0, speed_y = 0;               ///< of waves along rows and columns [m/s]
   double stiffness_scale = 1, cap_error = 0;     ///< [1], [m]
   double step = 0;                               ///< wanted [s]
+  bool automatic = false;                        ///< the step was not given
 
   SheetPlan(std::shared_ptr<const SpringNetwork> given, const Points<double>& start, const Values<double>& mass,
             double dt, double wanted_error);
@@ -40,8 +41,12 @@ class FilteredSheet final : public PointBody<S> {
   FilteredFacts facts() const;
   double kept_energy(const Vec3& gravity) const;
 
+  using PointBody<S>::stable_step;
+  double stable_step(const Method& method) const override;
+  MotionFacts motion_facts() const override;
   Energy energy(const Vec3& gravity) const override;
   void set_position(Index point, const Vec3& position) override;
+  void set_velocity(Index point, const Vec3& velocity) override;
   void pin(Index point) override;
   void release(Index point) override;
   void drive_pins(std::vector<Index> points, PinMotion motion) override;
@@ -108,6 +113,7 @@ class FilteredSheet final : public PointBody<S> {
 
   // Of the present substep.
   Index substep_ = 0;
+  std::int64_t evaluations_ = 0;
   bool known_ = false;  // z_ is the kick of the coming tick's start
   Vec3 known_gravity_{0, 0, 0};
   bool extra_on_ = false, jumps_ = false;
