@@ -80,7 +80,7 @@ class BulletSheet {
 std::vector<Series> bullet_classic(const PlainSprings& scene) {
   std::vector<Series> out;
   if (scene.triangles.empty()) return out;  // sheets only
-  for (const int iterations : {1, 5, 20}) {
+  for (const int iterations : {1, 2, 5, 20}) {
     Series series;
     series.name = "bullet-classic with piterations = " + std::to_string(iterations);
     series.levels = 8;

@@ -58,7 +58,7 @@
     var axis = { type: "log", exponentformat: "power", dtick: 1, gridcolor: "#e6eaef", zeroline: false,
       showline: true, linecolor: "#9aa6b2", mirror: true, ticks: "outside", tickcolor: "#9aa6b2" };
     return {
-      margin: { l: 80, r: 10, t: 12, b: 60 }, hovermode: "closest", paper_bgcolor: "#fff", plot_bgcolor: "#fff",
+      margin: { l: 80, r: 10, t: 34, b: 60 }, hovermode: "closest", paper_bgcolor: "#fff", plot_bgcolor: "#fff",
       font: { family: "system-ui, DejaVu Sans, sans-serif", size: 13, color: "#1d2733" },
       hoverlabel: { bgcolor: "#fff", bordercolor: "#9aa6b2", font: { size: 13, color: "#1d2733" }, align: "left" },
       xaxis: Object.assign({ title: { text: "processor time of one thread [s per simulated second]" } }, axis),

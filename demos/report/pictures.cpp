@@ -101,7 +101,7 @@ bool have_gnuplot() {
 }  // namespace
 
 std::string color_of(const std::string& method) {
-  if (method == "filtered-leapfrog") return "#00a651";
+  if (method == "filtered-leapfrog") return "#7fcf00";
   if (method == "yardstick") return "#000000";
   if (method == "bullet-classic") return "#a0522d";
   std::size_t i = 0;
