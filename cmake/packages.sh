@@ -40,6 +40,7 @@ hooke_require() {
 
 hooke_build_packages=(
   g++ cmake ninja-build libeigen3-dev
+  libhwy-dev                                               # fast kernels by instruction set
   libassimp-dev libtinyobjloader-dev                       # meshes and motion
   libopenvdb-dev libboost-iostreams-dev libtbb-dev         # level sets, threads
   nlohmann-json3-dev libcli11-dev                          # scenes, the command

@@ -2,9 +2,11 @@
 // acceleration and belongs to the world. Springs and wind are in hooke::softbody.
 #pragma once
 
+#include <hooke/stepper.hpp>
 #include <hooke/types.hpp>
 
 #include <functional>
+#include <memory>
 
 namespace hooke {
 
@@ -40,6 +42,9 @@ class ForceField {
     double gamma = 0;
   };
   virtual Rates rate_bounds(const Points<S>& x, const Points<S>& v, const Values<S>& inverse_mass) const;
+
+  /// A faster way to move points on which this field, gravity and pushes act alone, or null.
+  virtual std::unique_ptr<Stepper<S>> stepper() const { return nullptr; }
 };
 
 /// Linear drag: F = -c v, c in N·s/m. Terminal speed m g / c.

@@ -84,6 +84,8 @@ class Integrator {
 
   /// Since construction; kept by restart.
   const Work& work() const { return work_; }
+  /// Adds evaluations that somebody else made for it.
+  void count(std::int64_t evaluations) { work_.evaluations += evaluations; }
 
   /// Must be called when anything but this integrator changed x, v, or what forces depend on.
   void restart() { acceleration_known_ = false, increment_step_ = 0; }

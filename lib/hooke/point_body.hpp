@@ -39,6 +39,12 @@ class PointBody : public Body, protected Dynamics<S> {
   const MotionSettings& settings() const { return settings_; }
   Index substeps() const { return adapts() ? integrator_.adapted_steps() : substeps_; }  ///< in the last tick
 
+  /// True where a stepper of its only field moves it: a splitting method, forces of position alone. Ticks with
+  /// contacts or driven pins still take the general way.
+  bool fused() const {
+    return stepper_ && !uses_velocity_ && std::holds_alternative<Splitting>(settings_.method->scheme);
+  }
+
   using Body::stable_step;
   /// The largest stable substep [s] of the method in the present state; infinity or 0 as in
   /// largest_stable_step.
@@ -117,12 +123,15 @@ class PointBody : public Body, protected Dynamics<S> {
   void hold_fields(double t);
   void hold(Index point);
   SolveResult run_tick();
+  bool run_fast();
   StepReport explain(bool finite);
 
   MotionSettings settings_;
   Integrator<S> integrator_;
   Contacts<S> contacts_;
   std::vector<std::unique_ptr<const ForceField<S>>> fields_, held_fields_;
+  std::unique_ptr<Stepper<S>> stepper_;  // where there is one for the only field
+  std::vector<Stage> stages_;
   bool uses_velocity_ = false;
   Points<S> start_, previous_position_, previous_velocity_, force_, damping_product_;
   std::vector<Push> pushed_;

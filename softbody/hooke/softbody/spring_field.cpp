@@ -1,11 +1,15 @@
 #include <hooke/softbody/spring_field.hpp>
 
 #include <hooke/softbody/kernels.hpp>
+#if HOOKE_HAS_HIGHWAY
+#include <hooke/softbody/grid_stepper.hpp>
+#endif
 
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <numeric>
+#include <stdexcept>
 #include <tuple>
 
 namespace hooke::softbody {
@@ -41,7 +45,7 @@ S across(const Unit<S>& unit, S rest) {
 
 template <class S>
 SpringField<S>::SpringField(std::shared_ptr<const SpringNetwork> network, const Points<S>& start)
-    : network_(std::move(network)) {
+    : network_(std::move(network)), start_(start) {
   network_->check(start.rows());
   const auto& springs = network_->springs;
   std::vector<std::size_t> order(springs.size());
@@ -205,6 +209,19 @@ typename ForceField<S>::Rates SpringField<S>::rate_bounds(const Points<S>& x, co
     return found;
   };
   return {largest(stiffness), largest(damping)};
+}
+
+template <class S>
+std::unique_ptr<Stepper<S>> SpringField<S>::stepper() const {
+  if (damped_) return nullptr;
+#if HOOKE_HAS_HIGHWAY
+  try {
+    return make_grid_stepper(*network_, SpringGrid::of(*network_, start_.rows()), start_);
+  } catch (const std::invalid_argument&) {
+    // Not a grid.
+  }
+#endif
+  return nullptr;
 }
 
 template class SpringField<float>;

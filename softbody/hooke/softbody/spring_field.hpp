@@ -33,6 +33,9 @@ class SpringField final : public ForceField<S> {
   typename ForceField<S>::Rates rate_bounds(const Points<S>& x, const Points<S>& v,
                                             const Values<S>& inverse_mass) const override;
 
+  /// Force and step in one pass: for springs without dampers, where the build has Highway.
+  std::unique_ptr<Stepper<S>> stepper() const override;
+
  private:
   struct Run {  // springs [first, first + count) join points a + i and b + i
     Index first, count, a, b;
@@ -40,6 +43,7 @@ class SpringField final : public ForceField<S> {
   Index size() const { return stiffness_.size(); }
 
   std::shared_ptr<const SpringNetwork> network_;
+  Points<S> start_;
   bool damped_ = false;
   std::vector<Run> runs_;
   Index loose_ = 0;  // springs from here on are in no run

