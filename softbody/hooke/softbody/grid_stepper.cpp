@@ -1,6 +1,7 @@
 // This file is compiled once for every instruction set: Highway includes it again and again, up to
 // HWY_ONCE, and chooses at run time.
 #include <hooke/softbody/grid_stepper.hpp>
+#include <hooke/softbody/lines.hpp>
 
 #include <algorithm>
 #include <cstring>
@@ -10,6 +11,8 @@
 #define HWY_TARGET_INCLUDE "hooke/softbody/grid_stepper.cpp"
 #include <hwy/foreach_target.h>
 #include <hwy/highway.h>
+
+#include <hooke/softbody/lanes-inl.hpp>
 
 #ifndef HOOKE_GRID_STEPPER_STATE
 #define HOOKE_GRID_STEPPER_STATE
@@ -46,15 +49,10 @@ struct GridState {
 HWY_BEFORE_NAMESPACE();
 namespace hooke::softbody::HWY_NAMESPACE {
 
-namespace hn = hwy::HWY_NAMESPACE;
-
 template <class S>
 using Tag = hn::CappedTag<S, std::size_t(kColumns<S>)>;
 template <class S>
 using V = hn::Vec<Tag<S>>;
-
-// Below this length [m] squared a spring has no direction.
-constexpr double kTiny = 1e-24;
 
 // Lane i becomes element i - n of the sequence older, before, now. Only single lanes need the oldest.
 template <int n, class S>
@@ -79,11 +77,6 @@ HWY_INLINE V<S> shifted(V<S> now, V<S> before, [[maybe_unused]] V<S> older) {
   else
     return hn::CombineShiftRightBytes<kBytes>(d, now, middle);
 #endif
-}
-
-template <class S>
-HWY_INLINE V<S> square(V<S> x, V<S> y, V<S> z) {
-  return hn::MulAdd(z, z, hn::MulAdd(y, y, hn::MulAdd(x, x, hn::Set(Tag<S>(), S(kTiny)))));
 }
 
 // One stage on one row.
@@ -116,7 +109,7 @@ void row(const GridState<S>& grid, const GridWake<S>& wake, Index r, const Stage
         dx[i] = hn::Sub(hn::LoadU(d, to), ax);
         dy[i] = hn::Sub(hn::LoadU(d, to + st), ay);
         dz[i] = hn::Sub(hn::LoadU(d, to + 2 * st), az);
-        const auto l2 = square<S>(dx[i], dy[i], dz[i]);
+        const auto l2 = squared_length(d, dx[i], dy[i], dz[i]);
         const int at = i * kBlock + lane;
         s[i] = hn::Mul(hn::Load(d, stiffness + at), hn::Sub(l2, hn::Load(d, rest + 6 * kBlock + at)));
         l[i] = hn::MulAdd(hn::Load(d, rest + at), hn::Sqrt(l2), l2);
@@ -215,15 +208,8 @@ void run_grid(const GridState<S>& grid, std::span<const Stage> stages) {
 void run_grid_float(const GridState<float>& grid, std::span<const Stage> stages) { run_grid(grid, stages); }
 void run_grid_double(const GridState<double>& grid, std::span<const Stage> stages) { run_grid(grid, stages); }
 
-// Squared lengths by the operations of a row; n is a multiple of a block.
-template <class S>
-void squares(Index n, const S* d3, S* out) {
-  const Tag<S> d;
-  for (Index i = 0; i < n; i += Index(hn::MaxLanes(d)))
-    hn::StoreU(square<S>(hn::LoadU(d, d3 + i), hn::LoadU(d, d3 + n + i), hn::LoadU(d, d3 + 2 * n + i)), d, out + i);
-}
-void squares_float(Index n, const float* d3, float* out) { squares(n, d3, out); }
-void squares_double(Index n, const double* d3, double* out) { squares(n, d3, out); }
+void squares_float(Index n, const float* d3, float* out) { squared_lengths(n, d3, out); }
+void squares_double(Index n, const double* d3, double* out) { squared_lengths(n, d3, out); }
 
 }  // namespace hooke::softbody::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
@@ -241,23 +227,6 @@ HWY_EXPORT(squares_double);
 // Grids of more bytes than this leave a core's own caches: stages then run down the rows together.
 constexpr std::size_t kCacheBytes = std::size_t(2) << 20;
 constexpr std::size_t kTogether = 4;
-
-// Memory on cache lines.
-template <class S>
-class Lines {
- public:
-  void resize(std::size_t n) {
-    memory_.assign(n + 64 / sizeof(S), S(0));
-    const auto address = reinterpret_cast<std::uintptr_t>(memory_.data());
-    data_ = memory_.data() + (64 - address % 64) % 64 / sizeof(S);
-  }
-  S* data() const { return data_; }
-  bool empty() const { return memory_.empty(); }
-
- private:
-  std::vector<S> memory_;
-  S* data_ = nullptr;
-};
 
 template <class S>
 class GridStepper final : public Stepper<S> {

@@ -3,6 +3,7 @@
 #include <hooke/softbody/kernels.hpp>
 #if HOOKE_HAS_HIGHWAY
 #include <hooke/softbody/grid_stepper.hpp>
+#include <hooke/softbody/mesh_stepper.hpp>
 #endif
 
 #include <Eigen/Eigenvalues>
@@ -218,10 +219,11 @@ std::unique_ptr<Stepper<S>> SpringField<S>::stepper() const {
   try {
     return make_grid_stepper(*network_, SpringGrid::of(*network_, start_.rows()), start_);
   } catch (const std::invalid_argument&) {
-    // Not a grid.
+    return make_mesh_stepper(*network_, start_);  // not a grid
   }
-#endif
+#else
   return nullptr;
+#endif
 }
 
 template class SpringField<float>;

@@ -1,0 +1,163 @@
+// The fused kernels against the general integrator: the same method, to rounding.
+#include "core/problems.hpp"
+
+#include <hooke/softbody/soft_body.hpp>
+#include <hooke/world.hpp>
+
+#include <numeric>
+#include <random>
+
+namespace hooke::test {
+namespace {
+
+using softbody::Cloth;
+using softbody::SoftBodySettings;
+using softbody::Spring;
+using softbody::SpringNetwork;
+
+// Undamped cloth whose points and springs have no order: what a mesh file may hold.
+SoftBodySettings sheet(int columns, int rows, bool shuffled = false) {
+  softbody::ClothMaterial material;
+  material.damping_ratio = {0, 0, 0};
+  const Cloth cloth = softbody::cloth_from_grid(1, 0.8, columns, rows, {1, 0, 0}, {0, -1, 0.7}, material);
+  SoftBodySettings settings = softbody::settings_of(cloth);
+  settings.triangles.clear();
+  settings.pins = {0, 3, Index(columns) - 1};
+  if (shuffled) {
+    std::vector<int> place(std::size_t(columns * rows));
+    std::iota(place.begin(), place.end(), 0);
+    std::mt19937 random(5);
+    std::shuffle(place.begin(), place.end(), random);
+    SpringNetwork network = *settings.network;
+    for (Spring& spring : network.springs)
+      spring.a = place[std::size_t(spring.a)], spring.b = place[std::size_t(spring.b)];
+    std::shuffle(network.springs.begin(), network.springs.end(), random);
+    settings.network = std::make_shared<const SpringNetwork>(std::move(network));
+    const Points<double> x = settings.positions;
+    const Values<double> m = settings.masses;
+    for (Index i = 0; i < x.rows(); ++i) {
+      settings.positions.row(place[std::size_t(i)]) = x.row(i);
+      settings.masses[place[std::size_t(i)]] = m[i];
+    }
+    for (Index& pin : settings.pins) pin = place[std::size_t(pin)];
+  }
+  settings.velocities = Points<double>::Zero(settings.positions.rows(), 3);
+  for (Index i = 0; i < settings.velocities.rows(); ++i)
+    settings.velocities.row(i) << 0.1 * settings.positions(i, 1), 0.3 * settings.positions(i, 0), 0.05;
+  for (const Index pin : settings.pins) settings.velocities.row(pin).setZero();
+  return settings;
+}
+
+// A network without any order, in three dimensions.
+SoftBodySettings tangle(int points, int springs) {
+  SoftBodySettings settings;
+  std::mt19937 random(11);
+  const auto uniform = [&](double low, double high) {
+    return std::uniform_real_distribution<double>(low, high)(random);
+  };
+  const auto below = [&](int n) { return std::uniform_int_distribution<int>(0, n - 1)(random); };
+  settings.positions.resize(points, 3);
+  settings.masses.resize(points);
+  for (Index i = 0; i < points; ++i) {
+    settings.positions.row(i) << uniform(-1, 1), uniform(-1, 1), uniform(-1, 1);
+    settings.masses[i] = uniform(0.01, 0.1);
+  }
+  SpringNetwork network;
+  for (int i = 0; i < springs; ++i) {
+    const int a = below(points), b = (a + 1 + below(points - 1)) % points;
+    network.springs.push_back({a, b, uniform(1, 300), 0, i % 3 ? Spring::kFromStart : uniform(0, 1)});
+  }
+  settings.network = std::make_shared<const SpringNetwork>(std::move(network));
+  settings.pins = {1, 7};
+  return settings;
+}
+
+struct Run {
+  Points<double> position, velocity;
+};
+
+// `general` adds a force of zero, which no fused kernel knows.
+template <class S>
+Run run(SoftBodySettings settings, const Method& method, bool general, double seconds = 0.05) {
+  settings.precision = std::is_same_v<S, float> ? softbody::Precision::Float : softbody::Precision::Double;
+  settings.motion.method = &method;
+  World world;
+  Body& body = world.add(softbody::make_soft_body(settings));
+  auto& points = dynamic_cast<PointBody<S>&>(body);
+  if (general) points.add_field(std::make_unique<TimeForce<S>>([](double) { return Vec3(0, 0, 0); }));
+  EXPECT_EQ(points.fused(), !general);
+  for (int frame = 0; frame < int(seconds * 60 + 0.5); ++frame) {
+    body.add_force(5, {0.02, 0.01, -0.3});
+    EXPECT_TRUE(world.update(1.0 / 60).good());
+  }
+  return {body.positions(), body.velocities()};
+}
+
+template <class S>
+class Stepper : public testing::Test {};
+using Scalars = testing::Types<float, double>;
+TYPED_TEST_SUITE(Stepper, Scalars);
+
+template <class S>
+void expect_same_method(const SoftBodySettings& settings, const Method& method) {
+  const Run fused = run<S>(settings, method, false), general = run<S>(settings, method, true);
+  const double rounding = std::is_same_v<S, float> ? 2e-5 : 1e-12;
+  const double moved = (general.position - settings.positions).abs().maxCoeff();
+  EXPECT_GT(moved, 0.005);
+  EXPECT_LE((fused.position - general.position).abs().maxCoeff(), rounding) << method.name;
+  EXPECT_LE((fused.velocity - general.velocity).abs().maxCoeff(), 1e3 * rounding) << method.name;
+  for (const Index pin : settings.pins)
+    for (int k = 0; k < 3; ++k) EXPECT_EQ(fused.position(pin, k), double(S(settings.positions(pin, k))));
+}
+
+TYPED_TEST(Stepper, IsTheGeneralMethodOnGridsOfAnySize) {
+  for (const auto& [columns, rows] : {std::pair{2, 9}, {3, 3}, {8, 5}, {16, 4}, {17, 12}, {33, 20}, {40, 2}})
+    expect_same_method<TypeParam>(sheet(columns, rows), velocity_verlet());
+}
+
+TYPED_TEST(Stepper, IsTheGeneralMethodForEverySplitting) {
+  for (const Method* method : methods())
+    if (std::holds_alternative<Splitting>(method->scheme)) expect_same_method<TypeParam>(sheet(17, 12), *method);
+}
+
+TYPED_TEST(Stepper, IsTheGeneralMethodOnMeshesInAnyOrder) {
+  expect_same_method<TypeParam>(sheet(17, 12, true), velocity_verlet());
+  expect_same_method<TypeParam>(sheet(33, 20, true), semi_implicit_euler());
+  expect_same_method<TypeParam>(tangle(70, 400), velocity_verlet());
+  expect_same_method<TypeParam>(tangle(9, 20), velocity_verlet());
+}
+
+// Rest is bitwise rest: the kernel's forces at rest lengths are exactly zero.
+TYPED_TEST(Stepper, KeepsRest) {
+  for (SoftBodySettings settings : {sheet(19, 13), sheet(19, 13, true), tangle(50, 200)}) {
+    if (settings.positions.rows() == 50) {
+      SpringNetwork network = *settings.network;
+      for (Spring& spring : network.springs) spring.rest_length = Spring::kFromStart;
+      settings.network = std::make_shared<const SpringNetwork>(std::move(network));
+    }
+    settings.velocities.setZero();
+    settings.pins.clear();
+    settings.precision = std::is_same_v<TypeParam, float> ? softbody::Precision::Float : softbody::Precision::Double;
+    World world;
+    world.enable_gravity(false);
+    Body& body = world.add(softbody::make_soft_body(settings));
+    EXPECT_TRUE(dynamic_cast<PointBody<TypeParam>&>(body).fused());
+    const Points<double> start = body.positions();
+    EXPECT_TRUE(world.update(0.5).good());
+    EXPECT_TRUE((body.positions() == start).all());
+    EXPECT_TRUE((body.velocities() == 0).all());
+  }
+}
+
+// Springs that share a place, and springs of no length, pull nowhere and spoil nothing.
+TYPED_TEST(Stepper, SurvivesPointsAtOnePlace) {
+  for (const bool shuffled : {false, true}) {
+    SoftBodySettings settings = sheet(9, 9, shuffled);
+    settings.positions.row(40) = settings.positions.row(41);
+    const Run fused = run<TypeParam>(settings, velocity_verlet(), false);
+    EXPECT_TRUE(fused.position.allFinite());
+  }
+}
+
+}  // namespace
+}  // namespace hooke::test
