@@ -66,9 +66,12 @@ std::string script(const SceneReport& report, const std::string& png) {
          ", m'\n";
   out += "set grid xtics ytics lc rgb '#dddddd' lt 1\nset border lc rgb '#555555'\n";
   out += "set key outside right top reverse Left samplen 2.4 spacing 1.15 font ',11'\n";
-  if (report.reference.uncertainty() > 0.1 * low)
-    add("set arrow from graph 0, first %.3e to graph 1, first %.3e nohead lc rgb '#999999' dt 3\n",
-        report.reference.uncertainty(), report.reference.uncertainty());
+  const double unsure = report.reference.uncertainty();
+  if (unsure > low / 3) {
+    add("set arrow from graph 0, first %.3e to graph 1, first %.3e nohead lc rgb '#999999' dt 3\n", unsure, unsure);
+    add("set label 'the reference is no surer than this' at graph 0.01, first %.3e font ',9' tc rgb '#777777'\n",
+        1.25 * unsure);
+  }
   add("set yrange [%.3e:%.3e]\nset xrange [%.3e:%.3e]\n", low / 3, high * 3, left / 1.5, right * 1.5);
   out += "plot $front using 1:2 with lines lw 9 lc rgb '#ffd966' title 'Pareto front'";
   // The key names every method once, by colour, and every precision once, by mark and dash.
