@@ -145,7 +145,9 @@ std::vector<Series> contenders(const StandardScene& scene, const Scales& scales,
   std::vector<const Method*> every(methods().begin(), methods().end());
   every.push_back(&softbody::filtered_leapfrog());  // for grids alone
   for (const Method* method : every)
-    for (const auto& [precision, precision_name] : kPrecisions) {
+    for (const auto& entry : kPrecisions) {
+      const Precision precision = entry.first;
+      const std::string precision_name = entry.second;
       const double tick = duration_tick(scene);
       int first = 1;
       try {
@@ -158,12 +160,12 @@ std::vector<Series> contenders(const StandardScene& scene, const Scales& scales,
       const auto add = [&](const std::function<Solver(int)>& solver) {
         Series series;
         series.name = std::string(method->name) + ", " + precision_name;
-        series.run = [scene, scales, solver, name = std::string(method->name),
-                      precision_text = std::string(precision_name)](int level, int copies, double limit) {
+        series.run = [scene, scales, solver, name = std::string(method->name), precision_name](int level, int copies,
+                                                                                               double limit) {
           const Solver now = solver(level);
           Outcome outcome = run(scene, now, scales, copies, limit);
           outcome.row.method = name;
-          outcome.row.precision = precision_text;
+          outcome.row.precision = precision_name;
           if (now.dt == 0) outcome.row.tolerance = now.tolerance;
           return outcome;
         };
