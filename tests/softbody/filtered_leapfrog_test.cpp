@@ -287,7 +287,7 @@ TYPED_TEST(Filtered, HoldsAHeavyCorner) {
     ASSERT_TRUE(run.tick(1.0 / 240).good());
     ASSERT_LT(run.body->positions().abs().maxCoeff(), 3);
   }
-  EXPECT_NEAR(filtered_energy(*run.body, kGravity), start, 1.5);  // of 28 J that its fall exchanges
+  EXPECT_NEAR(filtered_energy(*run.body, kGravity), start, 0.02);  // of the 28 J that its fall exchanges
 }
 
 TYPED_TEST(Filtered, ShrugsOffTicksAndPushes) {
