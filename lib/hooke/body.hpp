@@ -3,6 +3,7 @@
 #pragma once
 
 #include <hooke/collider.hpp>
+#include <hooke/gang.hpp>
 #include <hooke/method.hpp>
 #include <hooke/types.hpp>
 
@@ -56,6 +57,7 @@ struct Tick {
   double start = 0, end = 0;  ///< [s]
   Vec3 gravity{0, 0, 0};      ///< [m/s²]
   std::span<const Collider> colliders;
+  Gang* gang = nullptr;  ///< threads for this body alone, or null
 };
 
 /// Writes where driven points are at time t: world coordinates [m], shape (driven count, 3).

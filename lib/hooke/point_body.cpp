@@ -379,7 +379,7 @@ bool PointBody<S>::run_fast() {
     }
   for (const Stage& stage : stages_) evaluations += stage.kick != 0;
   stepper_->load(points_, tick_.gravity, pushing_ ? &push_acceleration_ : nullptr);
-  stepper_->run(stages_);
+  stepper_->run(stages_, tick_.gang);
   stepper_->store(points_);
   integrator_.count(evaluations);
   return true;

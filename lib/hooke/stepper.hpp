@@ -1,6 +1,7 @@
 // Fast ways to move the points of one body, in a layout of their own.
 #pragma once
 
+#include <hooke/gang.hpp>
 #include <hooke/point_masses.hpp>
 
 #include <span>
@@ -23,7 +24,8 @@ class Stepper {
   /// Takes over positions, velocities and inverse masses.
   /// @param gravity [m/s²], on free points  @param push acceleration of every point [m/s²], (n, 3), or null
   virtual void load(const PointMasses<S>& points, const Vec3& gravity, const Points<S>* push) = 0;
-  virtual void run(std::span<const Stage> stages) = 0;
+  /// @param gang threads that may share the work, or null; the same bits at any number of them
+  virtual void run(std::span<const Stage> stages, Gang* gang) = 0;
   /// Writes positions and velocities back.
   virtual void store(PointMasses<S>& points) const = 0;
 };

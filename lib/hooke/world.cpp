@@ -37,6 +37,11 @@ void World::set_damping(double fraction_per_second) {
   damping_ = fraction_per_second;
 }
 
+void World::set_threads(int threads) {
+  gang_ = std::make_unique<Gang>(threads);
+  if (threads == 1) gang_ = nullptr;
+}
+
 void World::clear_forces() {
   for (const auto& body : bodies_) body->clear_forces();
 }
@@ -68,7 +73,8 @@ StepReport World::update(double frame_seconds) {
 
 // One tick. Accelerations, velocities and positions are the business of each body's method.
 StepReport World::step() {
-  const Tick tick{clock_.time(), clock_.time_at(clock_.ticks() + 1), gravity(), colliders_};
+  const Tick tick{clock_.time(), clock_.time_at(clock_.ticks() + 1), gravity(), colliders_,
+                  parallel_for_ && bodies_.size() > 1 ? nullptr : gang_.get()};
   reports_.assign(bodies_.size(), {});
   for_each_body([&](Body& body, std::size_t i) { reports_[i] = body.advance(tick); });
   for (const StepReport& report : reports_) {

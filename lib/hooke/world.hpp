@@ -47,6 +47,11 @@ class World {
 
   void set_parallel_for(ParallelFor parallel_for) { parallel_for_ = std::move(parallel_for); }
 
+  /// Threads that share the work on one body, where it is large enough and bodies are not moved in
+  /// parallel; the same bits at any number. 1: none but the caller's.
+  /// @throws std::invalid_argument below 1
+  void set_threads(int threads);
+
   /// Drops forces added since the last update (update does so itself at its end).
   void clear_forces();
 
@@ -75,6 +80,7 @@ class World {
   bool gravity_on_ = true;
   double damping_ = 0;
   ParallelFor parallel_for_;
+  std::unique_ptr<Gang> gang_;
   std::vector<StepReport> reports_;
 };
 

@@ -78,10 +78,11 @@ struct Run {
 
 // `general` adds a force of zero, which no fused kernel knows.
 template <class S>
-Run run(SoftBodySettings settings, const Method& method, bool general, double seconds = 0.05) {
+Run run(SoftBodySettings settings, const Method& method, bool general, int threads = 1, double seconds = 0.05) {
   settings.precision = std::is_same_v<S, float> ? softbody::Precision::Float : softbody::Precision::Double;
   settings.motion.method = &method;
   World world;
+  world.set_threads(threads);
   Body& body = world.add(softbody::make_soft_body(settings));
   auto& points = dynamic_cast<PointBody<S>&>(body);
   if (general) points.add_field(std::make_unique<TimeForce<S>>([](double) { return Vec3(0, 0, 0); }));
@@ -125,6 +126,26 @@ TYPED_TEST(Stepper, IsTheGeneralMethodOnMeshesInAnyOrder) {
   expect_same_method<TypeParam>(sheet(33, 20, true), semi_implicit_euler());
   expect_same_method<TypeParam>(tangle(70, 400), velocity_verlet());
   expect_same_method<TypeParam>(tangle(9, 20), velocity_verlet());
+}
+
+// Bands meet at rows that both work on; stages without a kick, pushes and uneven bands included.
+TYPED_TEST(Stepper, HasTheSameBitsAtAnyThreadCount) {
+  for (const auto& [columns, rows] : {std::pair{90, 71}, {33, 190}})
+    for (const Method* method : {&velocity_verlet(), &semi_implicit_euler(), &pefrl()}) {
+      const Run one = run<TypeParam>(sheet(columns, rows), *method, false);
+      for (const int threads : {2, 3, 4, 7}) {
+        const Run many = run<TypeParam>(sheet(columns, rows), *method, false, threads);
+        EXPECT_TRUE((one.position == many.position).all()) << threads << " threads, " << method->name;
+        EXPECT_TRUE((one.velocity == many.velocity).all()) << threads << " threads, " << method->name;
+      }
+    }
+}
+
+// Large grids run several stages down their rows at once; one band a thread does not.
+TYPED_TEST(Stepper, HasTheSameBitsWhereStagesFollowEachOther) {
+  const Run one = run<TypeParam>(sheet(300, 150), velocity_verlet(), false, 1, 1.0 / 60);
+  const Run two = run<TypeParam>(sheet(300, 150), velocity_verlet(), false, 2, 1.0 / 60);
+  EXPECT_TRUE((one.position == two.position).all());
 }
 
 // Rest is bitwise rest: the kernel's forces at rest lengths are exactly zero.

@@ -4,7 +4,7 @@
 #include <hooke/softbody/lines.hpp>
 
 #include <algorithm>
-#include <cstring>
+#include <atomic>
 #include <map>
 
 #undef HWY_TARGET_INCLUDE
@@ -22,6 +22,12 @@ namespace hooke::softbody {
 template <class S>
 constexpr int kColumns = int(64 / sizeof(S));
 
+// Stages whose old rows a band has seen, and those it has finished.
+struct alignas(64) GridBand {
+  std::atomic<int> ready{0};
+  alignas(64) std::atomic<int> done{0};
+};
+
 // What a stage keeps of the rows behind it.
 template <class S>
 struct GridWake {
@@ -37,8 +43,16 @@ struct GridState {
   const S* const* stiffness;  // by row: blocks of six directions
   const S* const* rest;       // by row: blocks of L in six directions, then L²
   S gravity[3];
-  std::span<const GridWake<S>> wakes;  // as many stages run at once
+  std::span<const GridWake<S>> wakes;
 
+  // Bands of rows, one a thread; with one band, `together` stages run down the rows at once.
+  int bands;
+  std::size_t together;
+  GridBand* band;
+  S* halo;  // by band: its first two rows as they were before the stage
+
+  Index first(int b) const { return rows * b / bands; }
+  S* edge(int b, int row) const { return halo + (b * 2 + row) * 3 * stride + kColumns<S>; }
   S* position(Index row) const { return x + row * 3 * stride + kColumns<S>; }
   S* old(const GridWake<S>& wake, Index row) const { return wake.ring + ((row + 4) & 3) * 7 * stride + kColumns<S>; }
 };
@@ -79,9 +93,9 @@ HWY_INLINE V<S> shifted(V<S> now, V<S> before, [[maybe_unused]] V<S> older) {
 #endif
 }
 
-// One stage on one row.
-template <bool pushed, class S>
-void row(const GridState<S>& grid, const GridWake<S>& wake, Index r, const Stage& stage) {
+// One stage on row r, with the two rows below it; without `stepped`, no more than its springs.
+template <bool pushed, bool stepped, class S>
+void row(const GridState<S>& grid, const GridWake<S>& wake, Index r, const Stage& stage, const S* x1, const S* x2) {
   const Tag<S> d;
   constexpr int kLanes = int(hn::MaxLanes(d));
   constexpr int kBlock = kColumns<S>;
@@ -89,7 +103,6 @@ void row(const GridState<S>& grid, const GridWake<S>& wake, Index r, const Stage
   const auto kick = hn::Set(d, S(stage.kick)), drift = hn::Set(d, S(stage.drift));
   const auto gx = hn::Set(d, grid.gravity[0]), gy = hn::Set(d, grid.gravity[1]), gz = hn::Set(d, grid.gravity[2]);
   S* HWY_RESTRICT x0 = grid.position(r);
-  const S *x1 = grid.position(r + 1), *x2 = grid.position(r + 2);
   S* HWY_RESTRICT o0 = grid.old(wake, r);
   const S *o1 = grid.old(wake, r - 1), *o2 = grid.old(wake, r - 2);
   S* HWY_RESTRICT motion = grid.motion + r * grid.blocks * 4 * kBlock;
@@ -150,16 +163,18 @@ void row(const GridState<S>& grid, const GridWake<S>& wake, Index r, const Stage
       pull(o2, s2 + 3 * st);
       hn::Store(ax, d, o0), hn::Store(ay, d, o0 + st), hn::Store(az, d, o0 + 2 * st);
       own(kDiagonal, s0 + st), own(kAntidiagonal, s0 + 2 * st), own(kDown2, s0 + 3 * st);
-      const auto w = hn::Load(d, motion + 3 * kBlock + lane);
-      const auto free = hn::Ne(w, hn::Zero(d));
-      const auto step = [&](int k, V<S> f, V<S> g, V<S> a) HWY_ATTR {
-        auto more = hn::IfThenElseZero(free, g);
-        if constexpr (pushed) more = hn::Add(more, hn::Load(d, push + k * kBlock + lane));
-        const auto v = hn::MulAdd(kick, hn::MulAdd(f, w, more), hn::Load(d, motion + k * kBlock + lane));
-        hn::Store(v, d, motion + k * kBlock + lane);
-        hn::Store(hn::MulAdd(drift, v, a), d, x0 + k * st);
-      };
-      step(0, fx, gx, ax), step(1, fy, gy, ay), step(2, fz, gz, az);
+      if constexpr (stepped) {
+        const auto w = hn::Load(d, motion + 3 * kBlock + lane);
+        const auto free = hn::Ne(w, hn::Zero(d));
+        const auto step = [&](int k, V<S> f, V<S> g, V<S> a) HWY_ATTR {
+          auto more = hn::IfThenElseZero(free, g);
+          if constexpr (pushed) more = hn::Add(more, hn::Load(d, push + k * kBlock + lane));
+          const auto v = hn::MulAdd(kick, hn::MulAdd(f, w, more), hn::Load(d, motion + k * kBlock + lane));
+          hn::Store(v, d, motion + k * kBlock + lane);
+          hn::Store(hn::MulAdd(drift, v, a), d, x0 + k * st);
+        };
+        step(0, fx, gx, ax), step(1, fy, gy, ay), step(2, fz, gz, az);
+      }
       x0 += kLanes, x1 += kLanes, x2 += kLanes, o0 += kLanes, o1 += kLanes, o2 += kLanes;
       s0 += kLanes, s1 += kLanes, s2 += kLanes;
     }
@@ -182,31 +197,88 @@ void drift_row(const GridState<S>& grid, Index r, S drift) {
       }
 }
 
+template <bool stepped, class S>
+void row(const GridState<S>& grid, const GridWake<S>& wake, Index r, const Stage& stage, const S* x1, const S* x2) {
+  if (stepped && grid.push)
+    row<true, stepped>(grid, wake, r, stage, x1, x2);
+  else
+    row<false, stepped>(grid, wake, r, stage, x1, x2);
+}
+
+// Nothing is above the first row.
+template <class S>
+void begin_wake(const GridState<S>& grid, const GridWake<S>& wake) {
+  for (Index r = -2; r < 0; ++r) std::fill_n(grid.old(wake, r) - kColumns<S>, 7 * grid.stride, S(0));
+}
+
 // A stage needs two rows ahead of the one it steps, so the next stage may follow three rows behind.
 template <class S>
-void run_grid(const GridState<S>& grid, std::span<const Stage> stages) {
+void run_together(const GridState<S>& grid, std::span<const Stage> stages) {
   while (!stages.empty()) {
-    const std::size_t together = std::min(grid.wakes.size(), stages.size());
-    for (std::size_t i = 0; i < together; ++i)
-      for (Index r = -2; r < 0; ++r) std::fill_n(grid.old(grid.wakes[i], r) - kColumns<S>, 7 * grid.stride, S(0));
+    const std::size_t together = std::min(grid.together, stages.size());
+    for (std::size_t i = 0; i < together; ++i) begin_wake(grid, grid.wakes[i]);
     for (Index front = 0; front < grid.rows + 3 * Index(together - 1); ++front)
       for (std::size_t i = 0; i < together; ++i) {
         const Index r = front - 3 * Index(i);
         if (r < 0 || r >= grid.rows) continue;
-        const Stage& stage = stages[i];
-        if (stage.kick == 0)
-          drift_row(grid, r, S(stage.drift));
-        else if (grid.push)
-          row<true>(grid, grid.wakes[i], r, stage);
+        if (stages[i].kick == 0)
+          drift_row(grid, r, S(stages[i].drift));
         else
-          row<false>(grid, grid.wakes[i], r, stage);
+          row<true>(grid, grid.wakes[i], r, stages[i], grid.position(r + 1), grid.position(r + 2));
       }
     stages = stages.subspan(together);
   }
 }
 
-void run_grid_float(const GridState<float>& grid, std::span<const Stage> stages) { run_grid(grid, stages); }
-void run_grid_double(const GridState<double>& grid, std::span<const Stage> stages) { run_grid(grid, stages); }
+// Rows [first, last) of one band. Springs that cross its upper edge are worked on twice, by both bands, from
+// the same old positions: the same bits as in one pass over all rows. Before the band below steps
+// its first rows it keeps their old positions for us; before we step our last rows it has used them.
+template <class S>
+void run_band(const GridState<S>& grid, std::span<const Stage> stages, int b) {
+  const Index first = grid.first(b), last = grid.first(b + 1);
+  const bool above = b > 0, below = b + 1 < grid.bands;
+  const GridWake<S>& wake = grid.wakes[std::size_t(b)];
+  GridBand& own = grid.band[b];
+  if (!above) begin_wake(grid, wake);
+  for (std::size_t i = 0; i < stages.size(); ++i) {
+    const Stage& stage = stages[i];
+    if (stage.kick == 0) {
+      for (Index r = first; r < last; ++r) drift_row(grid, r, S(stage.drift));
+      own.ready.store(int(i) + 1, std::memory_order_release);
+      own.done.store(int(i) + 1, std::memory_order_release);
+      continue;
+    }
+    if (above) {
+      wait_for(grid.band[b - 1].done, int(i));
+      for (int k = 0; k < 2; ++k)
+        std::copy_n(grid.position(first + k) - kColumns<S>, 3 * grid.stride, grid.edge(b, k) - kColumns<S>);
+      for (Index r = first - 2; r < first; ++r)
+        row<false>(grid, wake, r, stage, grid.position(r + 1), grid.position(r + 2));
+    } else {
+      begin_wake(grid, wake);
+    }
+    own.ready.store(int(i) + 1, std::memory_order_release);
+    for (Index r = first; r < last; ++r) {
+      const auto under = [&](Index row) HWY_ATTR {
+        return below && row >= last ? grid.edge(b + 1, int(row - last)) : grid.position(row);
+      };
+      if (below && r == last - 2) wait_for(grid.band[b + 1].ready, int(i) + 1);
+      row<true>(grid, wake, r, stage, under(r + 1), under(r + 2));
+    }
+    own.done.store(int(i) + 1, std::memory_order_release);
+  }
+}
+
+template <class S>
+void run_grid(const GridState<S>& grid, std::span<const Stage> stages, int b) {
+  if (grid.bands == 1)
+    run_together(grid, stages);
+  else
+    run_band(grid, stages, b);
+}
+
+void run_grid_float(const GridState<float>& grid, std::span<const Stage> stages, int b) { run_grid(grid, stages, b); }
+void run_grid_double(const GridState<double>& grid, std::span<const Stage> stages, int b) { run_grid(grid, stages, b); }
 
 void squares_float(Index n, const float* d3, float* out) { squared_lengths(n, d3, out); }
 void squares_double(Index n, const double* d3, double* out) { squared_lengths(n, d3, out); }
@@ -227,6 +299,8 @@ HWY_EXPORT(squares_double);
 // Grids of more bytes than this leave a core's own caches: stages then run down the rows together.
 constexpr std::size_t kCacheBytes = std::size_t(2) << 20;
 constexpr std::size_t kTogether = 4;
+// Bands of fewer points do not pay for their edges.
+constexpr Index kBandPoints = 1500, kBandRows = 8;
 
 template <class S>
 class GridStepper final : public Stepper<S> {
@@ -240,11 +314,8 @@ class GridStepper final : public Stepper<S> {
     state_.x = x_.data(), state_.motion = motion_.data();
     make_springs(network, grid, start);
     const std::size_t bytes = sizeof(S) * std::size_t(grid.rows * state_.blocks * kBlock) * 19;
-    wakes_.resize(bytes > kCacheBytes ? kTogether : 1);
-    rings_.resize(wakes_.size() * std::size_t(4 * 7 * state_.stride));
-    for (std::size_t i = 0; i < wakes_.size(); ++i)
-      wakes_[i].ring = rings_.data() + std::ptrdiff_t(i) * 4 * 7 * state_.stride;
-    state_.wakes = wakes_;
+    state_.together = bytes > kCacheBytes ? kTogether : 1;
+    make_wakes(state_.together);
   }
 
   void load(const PointMasses<S>& points, const Vec3& gravity, const Points<S>* push) override {
@@ -260,11 +331,23 @@ class GridStepper final : public Stepper<S> {
     for (Index r = 0; r < state_.rows; ++r) to_blocks(&points.inverse_mass[r * columns_], r, 4, 3, state_.motion);
   }
 
-  void run(std::span<const Stage> stages) override {
-    if constexpr (std::is_same_v<S, float>)
-      HWY_DYNAMIC_DISPATCH(run_grid_float)(state_, stages);
-    else
-      HWY_DYNAMIC_DISPATCH(run_grid_double)(state_, stages);
+  void run(std::span<const Stage> stages, Gang* gang) override {
+    const Index room = std::min(state_.rows / kBandRows, state_.rows * columns_ / kBandPoints);
+    state_.bands = gang ? int(std::clamp<Index>(room, 1, gang->size())) : 1;
+    if (state_.bands == 1) {
+      run_one(stages, 0);
+      return;
+    }
+    if (std::size_t(state_.bands) > wakes_.size()) make_wakes(std::size_t(state_.bands));
+    if (bands_.size() < std::size_t(state_.bands)) {
+      bands_ = std::vector<GridBand>(std::size_t(state_.bands));
+      halo_.resize(std::size_t(state_.bands * 2 * 3 * state_.stride));
+    }
+    state_.band = bands_.data(), state_.halo = halo_.data();
+    for (GridBand& band : bands_) band.ready = 0, band.done = 0;
+    gang->run([&](int b) {
+      if (b < state_.bands) run_one(stages, b);
+    });
   }
 
   void store(PointMasses<S>& points) const override {
@@ -279,6 +362,20 @@ class GridStepper final : public Stepper<S> {
 
  private:
   static constexpr int kBlock = kColumns<S>;
+
+  void run_one(std::span<const Stage> stages, int b) {
+    if constexpr (std::is_same_v<S, float>)
+      HWY_DYNAMIC_DISPATCH(run_grid_float)(state_, stages, b);
+    else
+      HWY_DYNAMIC_DISPATCH(run_grid_double)(state_, stages, b);
+  }
+
+  void make_wakes(std::size_t n) {
+    wakes_.resize(n);
+    rings_.resize(n * std::size_t(4 * 7 * state_.stride));
+    for (std::size_t i = 0; i < n; ++i) wakes_[i].ring = rings_.data() + std::ptrdiff_t(i) * 4 * 7 * state_.stride;
+    state_.wakes = wakes_;
+  }
 
   // Of a value of a point, in rows of blocks of so many fields.
   Index at(Index r, Index c, int fields, int field) const {
@@ -341,9 +438,10 @@ class GridStepper final : public Stepper<S> {
 
   Index columns_;
   GridState<S> state_{};
-  Lines<S> x_, motion_, push_, stiffness_, rest_, rings_;
+  Lines<S> x_, motion_, push_, stiffness_, rest_, rings_, halo_;
   std::vector<const S*> stiffness_row_, rest_row_;
   std::vector<GridWake<S>> wakes_;
+  std::vector<GridBand> bands_;
 };
 
 }  // namespace

@@ -267,7 +267,7 @@ class MeshStepper final : public Stepper<S> {
     }
   }
 
-  void run(std::span<const Stage> stages) override {
+  void run(std::span<const Stage> stages, Gang*) override {
     if constexpr (std::is_same_v<S, float>)
       HWY_DYNAMIC_DISPATCH(run_mesh_float)(state_, stages);
     else
