@@ -1,0 +1,531 @@
+#include <hooke/softbody/choose_solver.hpp>
+
+#include <hooke/error.hpp>
+#include <hooke/softbody/filtered_grid.hpp>
+#include <hooke/world.hpp>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <limits>
+#include <stdexcept>
+
+namespace hooke::softbody {
+
+namespace {
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+// Steps are kept at this share of the largest stable one.
+constexpr double kStepSafety = 0.9;
+// Predicted errors times this must be below the wanted one, by order 2 and by higher orders.
+constexpr double kSafety = 2, kHighSafety = 3;
+// Rounding in float moves points by this share of the size times √steps (measured on sheets, chains and boxes).
+constexpr double kFloatFloor = 1.2e-8;
+// What rounding alone may take must be so much less than the wanted error.
+constexpr double kRoom = 1.3;
+// Errors grow as a power of time between these; measured ones beyond are not believed.
+constexpr double kLeastGrowth = 0.5, kMostGrowth = 2.5;
+// The power may be wrong by this.
+constexpr double kDoubt = 0.75;
+// Filtered leapfrog is for errors from this share of the size on; its trials may cost so much of velocity Verlet's run.
+constexpr double kFilteredFrom = 3e-4, kFilteredBudget = 0.35, kQuietBudget = 0.08;
+// Trials keep at most so many states.
+constexpr Index kMostStates = 64;
+
+template <class... Values>
+std::string format(const char* pattern, Values... values) {
+  char text[500];
+  std::snprintf(text, sizeof text, pattern, values...);
+  return text;
+}
+
+const char* name_of(Precision precision) { return precision == Precision::Float ? "float" : "double"; }
+
+double rms(const Points<double>& a, const Points<double>& b) {
+  return std::sqrt((a - b).square().rowwise().sum().mean());
+}
+
+double size_of(const Points<double>& x) {
+  return x.rows() ? std::sqrt((x.colwise().maxCoeff() - x.colwise().minCoeff()).square().sum()) : 0;
+}
+
+bool is_grid(const SoftBodySettings& s) {
+  if (!s.network || s.network->springs.empty()) return false;
+  try {
+    const SpringGrid grid = SpringGrid::of(*s.network, s.positions.rows());
+    return grid.rows > 1 && grid.columns > 1;
+  } catch (const std::invalid_argument&) {
+    return false;
+  }
+}
+
+// Whether the fused kernels can run it.
+bool springs_alone(const SoftBodySettings& s) {
+  if (s.linear_drag != 0 || s.quadratic_drag != 0 || (s.wind && !s.wind->once_a_tick)) return false;
+  return !s.network || std::none_of(s.network->springs.begin(), s.network->springs.end(),
+                                    [](const Spring& spring) { return spring.damping > 0; });
+}
+
+void check(const SoftBodySettings& settings, const RunSetting& run) {
+  const auto positive = [&](double value, const char* what) {
+    if (!(value > 0) || !std::isfinite(value))
+      throw std::invalid_argument("body \"" + settings.name + "\": " + what + " must be positive, got " +
+                                  format("%g", value));
+  };
+  positive(run.duration, "duration");
+  positive(run.tick_rate, "tick rate");
+}
+
+Index ticks_of(const RunSetting& run) {
+  return std::max<Index>(1, Index(std::floor(run.duration * run.tick_rate + 1e-6)));
+}
+
+// One run of the body, tick by tick, its states kept now and then.
+class Trial {
+ public:
+  Trial(const SoftBodySettings& settings, const RunSetting& run, Index stride)
+      : world_(run.tick_rate), stride_(stride) {
+    world_.set_gravity(run.gravity);
+    world_.set_damping(run.damping);
+    for (const Collider& collider : run.colliders) world_.add_collider(collider);
+    body_ = &world_.add(make_soft_body(settings));
+    if (run.prepare) run.prepare(*body_);
+  }
+
+  /// Goes on to this tick, or to the one that fails.
+  void reach(Index tick) {
+    const double length = world_.clock().tick();
+    while (good_ && done_ < tick) {
+      good_ = world_.update(length).good();
+      if (good_ && ++done_ % stride_ == 0) states_.push_back(body_->positions());
+    }
+  }
+  Index done() const { return done_; }
+  const std::vector<Points<double>>& states() const { return states_; }
+  Points<double> positions() const { return body_->positions(); }
+
+ private:
+  World world_;
+  Body* body_ = nullptr;
+  Index stride_, done_ = 0;
+  bool good_ = true;
+  std::vector<Points<double>> states_;
+};
+
+// The most that two runs differ up to a tick; infinite where one of them failed.
+double difference(const Trial& a, const Trial& b, Index tick, Index stride) {
+  double most = 0;
+  for (std::size_t i = 0; i < std::size_t(tick / stride); ++i) {
+    if (i >= a.states().size() || i >= b.states().size()) return kInfinity;
+    const double now = rms(a.states()[i], b.states()[i]);
+    if (!std::isfinite(now)) return kInfinity;
+    most = std::max(most, now);
+  }
+  return most;
+}
+
+// What an error that was seen up to a share of the run becomes at its end.
+struct Forecast {
+  double likely = 0, high = 0;
+
+  Forecast(double seen, double seen_at_half, double share) {
+    const double slope = seen_at_half > 0 && std::isfinite(seen) ? std::log2(seen / seen_at_half) : 1;
+    const double power = std::clamp(slope, kLeastGrowth, kMostGrowth);
+    likely = seen * std::pow(1 / share, power);
+    high = likely * std::pow(1 / share, kDoubt);
+  }
+};
+
+class Chooser {
+ public:
+  Chooser(const SoftBodySettings& settings, const RunSetting& run, double wanted_error)
+      : settings_(settings), run_(run), ticks_(ticks_of(run)) {
+    settings_.motion.dt = 0;
+    settings_.wanted_error = 0;
+    settings_.motion.method = &velocity_verlet();
+    settings_.precision = Precision::Double;
+    tick_ = 1 / run.tick_rate;
+    stride_ = (ticks_ + kMostStates - 1) / kMostStates;
+    choice_.size = size_of(settings.positions);
+    choice_.wanted_error = wanted_ = wanted_error * choice_.size;
+    const auto body = make_soft_body(settings_);
+    if (run.prepare) run.prepare(*body);
+    for (const Method* method : {&velocity_verlet(), &pefrl(), &blanes_moan_6(), &rk4()})
+      limits_.push_back({method, body->stable_step(*method)});
+    high_ = body->motion_facts().velocity_forces ? &rk4() : &pefrl();
+    highest_ = high_ == &pefrl() ? &blanes_moan_6() : nullptr;
+  }
+
+  SolverChoice run() {
+    if (settings_.positions.rows() == 0 || !(choice_.size > 0)) return trivial("a body without size needs no choice");
+    if (!std::isfinite(limit(velocity_verlet()))) return trivial("nothing limits the step");
+    base_ = candidate(velocity_verlet(), Precision::Float, 1);
+    if (!filtered_leapfrog_does()) look_at_velocity_verlet();
+    return finish();
+  }
+
+ private:
+  struct Limit {
+    const Method* method;
+    double step;
+  };
+
+  double limit(const Method& method) const {
+    for (const Limit& known : limits_)
+      if (known.method == &method) return known.step;
+    return 0;
+  }
+
+  // `finer` times as many steps as the limit asks for.
+  Index substeps(const Method& method, double finer) const {
+    const double least = std::isfinite(limit(method)) ? std::ceil(tick_ / (kStepSafety * limit(method)) - 1e-9) : 1;
+    return std::max<Index>(1, Index(std::ceil(finer * std::max(1.0, least) - 1e-9)));
+  }
+
+  Candidate candidate(const Method& method, Precision precision, double finer) const {
+    return with_steps(method, precision, substeps(method, finer));
+  }
+
+  Candidate with_steps(const Method& method, Precision precision, Index steps) const {
+    Candidate out;
+    out.method = &method;
+    out.precision = precision;
+    out.substeps = steps;
+    out.evaluations = evaluations_of(method, double(ticks_), double(steps));
+    out.seconds = modelled_seconds(settings_, method, precision, out.evaluations);
+    return out;
+  }
+
+  // Its rounding alone, at the end of the run.
+  double floor_of(const Candidate& c) const {
+    const double stages = c.method == &velocity_verlet() ? 1 : 2;
+    const double share = c.precision == Precision::Float ? kFloatFloor : kFloatFloor * 2e-9;
+    return share * choice_.size * std::sqrt(stages * double(ticks_) * double(c.substeps));
+  }
+
+  std::unique_ptr<Trial> trial(const Candidate& c) const {
+    SoftBodySettings s = settings_;
+    s.motion.method = c.method;
+    s.precision = c.precision;
+    s.motion.dt = tick_ / double(c.substeps);
+    return std::make_unique<Trial>(s, run_, stride_);
+  }
+
+  // Runs a trial on to a tick and counts what that costs.
+  void reach(Trial& t, const Candidate& c, Index tick) {
+    const double before = double(t.done());
+    t.reach(tick);
+    const double share = (double(t.done()) - before) / double(ticks_);
+    choice_.pilot_evaluations += share * c.evaluations;
+    choice_.pilot_seconds += share * c.seconds;
+  }
+
+  // The first tick with a kept state at or after this share of the run.
+  Index tick_of(double share) const {
+    const Index tick = Index(std::ceil(share * double(ticks_)));
+    return std::clamp<Index>((tick + stride_ - 1) / stride_ * stride_, stride_, ticks_ / stride_ * stride_);
+  }
+  double shown(double share) const { return double(tick_of(share)) / double(ticks_); }
+
+  void consider(Candidate c, double error) {
+    c.predicted_error = error;
+    considered_.push_back(c);
+  }
+
+  // Filtered leapfrog over the whole run from coarse steps on: its trials are cheap beside velocity Verlet.
+  bool filtered_leapfrog_does() {
+    if (!is_grid(settings_)) return false;
+    // For small errors only sheets that hardly move are worth a look.
+    const bool quiet = wanted_ < kFilteredFrom * choice_.size;
+    const Method& method = filtered_leapfrog();
+    const double budget = (quiet ? kQuietBudget : kFilteredBudget) * base_.seconds;
+    std::unique_ptr<Trial> before;
+    Index steps = 1;
+    double change_before = kInfinity, travel = 0;
+    try {
+      SoftBodySettings s = settings_;
+      s.motion.method = &method;
+      s.precision = Precision::Float;
+      s.motion.dt = tick_;
+      const auto facts = filtered_facts(*make_soft_body(s));
+      if (!facts || !(facts->travel > 0)) return false;
+      // Begin where the rule for sheets tells 16 times the wanted error, or at a fiftieth of velocity Verlet's cost.
+      const double most = std::min(0.5, std::pow(16 * wanted_ / (0.11 * choice_.size), 1 / 1.33));
+      const double cheap = (quiet ? 0.005 : 0.02) * base_.seconds / with_steps(method, Precision::Float, 1).seconds;
+      steps = Index(std::max(1.0, std::min(std::ceil(facts->travel / most), std::floor(cheap))));
+      travel = facts->travel;
+      for (int level = 0; level < 12; ++level, steps *= 2) {
+        const Candidate c = with_steps(method, Precision::Float, steps);
+        if (choice_.pilot_seconds + c.seconds > budget) return false;
+        auto now = trial(c);
+        reach(*now, c, ticks_);
+        if (before) {
+          const bool both = now->done() == ticks_ && before->done() == ticks_;
+          const double change = both ? rms(now->positions(), before->positions()) : kInfinity;
+          // Too large steps freeze: two frozen runs agree as well, three that come closer do not.
+          const bool settling = std::isfinite(change_before) && change_before > 1.5 * change;
+          const double order = settling ? std::clamp(std::log2(change_before / change), 0.7, 1.8) : 1.0;
+          const bool believed = settling || travel / double(steps) < 0.25 || change + change_before < 0.02 * wanted_;
+          const double error = change / (std::pow(2.0, order) - 1);
+          change_before = change;
+          const double finer = std::pow(kSafety * error / wanted_, 1 / order);
+          if (believed && std::isfinite(error) && finer <= 4) {
+            Candidate best =
+                with_steps(method, Precision::Float, Index(std::ceil(double(steps) * std::max(0.5, finer))));
+            if (best.seconds > 0.8 * base_.seconds) return false;
+            consider(best, error * std::pow(double(steps) / double(best.substeps), order));
+            choice_.reason =
+                format("over the whole run filtered leapfrog changes by %.1e m from %ld to %ld steps a tick", change,
+                       long(steps / 2), long(steps));
+            return true;
+          }
+        }
+        before = std::move(now);
+      }
+    } catch (const std::exception&) {
+      // It does not take this body.
+    }
+    return false;
+  }
+
+  // The pair of trials of velocity Verlet, at the limit and at half of it, on to a share of the run.
+  void extend_pair(double share) {
+    share_ = share;
+    for (int i : {0, 1}) reach(*pair_[i], pair_candidate_[i], tick_of(share));
+  }
+
+  // Error at the limit as the pair tells it: 4/3 of the difference at order 2, twice where motion is rough. Where it
+  // is not more than rounding, of which the finer one has more, it is as much as that.
+  double pair_error(double share) const {
+    const double seen = difference(*pair_[0], *pair_[1], tick_of(share), stride_);
+    const double rounding = std::sqrt(3 * shown(share)) * floor_of(pair_candidate_[0]);
+    return seen < 3 * rounding ? seen / std::sqrt(3.0) : 1.5 * seen;
+  }
+
+  Forecast forecast() const { return {pair_error(share_), pair_error(share_ / 2), shown(share_)}; }
+
+  void look_at_velocity_verlet() {
+    const Method& method = velocity_verlet();
+    // Where rounding rules float out.
+    const Precision precision = wanted_ >= kRoom * floor_of(base_) ? Precision::Float : Precision::Double;
+    const Candidate base = candidate(method, precision, 1);
+    pair_candidate_[0] = base, pair_candidate_[1] = candidate(method, precision, 2);
+    for (int i : {0, 1}) pair_[i] = trial(pair_candidate_[i]);
+    const auto enough = [&](double error, const char* how) {
+      consider(base, std::max(error, floor_of(base)));
+      choice_.reason =
+          format("seen over the first %.3g of the run, velocity Verlet at its stability limit errs by %s %.1e m",
+                 shown(share_), how, error);
+    };
+    for (const double share : {1.0 / 16, 1.0 / 8, 1.0 / 4}) {
+      extend_pair(share);
+      const Forecast now = forecast();
+      if (kSafety * now.high <= wanted_) return enough(now.high, "less than");
+      // Clearly not: what comes is dearer and looked at in its own way.
+      if (!(now.likely <= 8 * kSafety * wanted_)) break;
+    }
+    const Forecast now = forecast();
+    if (kSafety * now.likely <= wanted_) return enough(now.likely, "about");
+    refine(now);
+  }
+
+  // Velocity Verlet at its limit is not enough.
+  void refine(const Forecast& seen) {
+    const Precision precision = pair_candidate_[0].precision;
+    if (share_ >= 0.25 && kSafety * seen.likely <= 2 * wanted_) {
+      // At order 1 the pair tells three quarters of the error.
+      const double by_order = 1.5 * kSafety * seen.likely / wanted_;
+      Candidate c = candidate(velocity_verlet(), precision, std::sqrt(by_order));
+      consider(c, std::max(wanted_ / kSafety, floor_of(c)));
+      choice_.reason =
+          format("seen over the first %.3g of the run, velocity Verlet at its stability limit errs by about %.1e m",
+                 shown(share_), seen.likely);
+      return;
+    }
+    // Where what is needed costs several times more, the growth of errors is looked at to the end.
+    const double finer = std::min(3.0, std::sqrt(kSafety * seen.likely / wanted_));
+    const double needed =
+        std::min(candidate(velocity_verlet(), precision, finer).seconds, candidate(*high_, precision, 1).seconds);
+    const double rest = (1 - shown(share_)) * (pair_candidate_[0].seconds + pair_candidate_[1].seconds);
+    if (choice_.pilot_seconds + rest <= 0.7 * needed) extend_pair(1);
+    const double whole = share_ == 1 ? pair_error(1) : seen.likely;
+
+    // The next order as judge of both, over a first part.
+    const double part = 1.0 / 8;
+    if (share_ < part) extend_pair(part);
+    const double here = pair_error(part);
+    const double growth = here > 0 && std::isfinite(whole) ? std::max(1.0, whole / here) : 1;
+    // In float the differences would be its rounding.
+    const Precision judging = wanted_ < 30 * floor_of(base_) ? Precision::Double : precision;
+    const Candidate high = candidate(*high_, judging, 1);
+    const auto judge = trial(high);
+    reach(*judge, high, tick_of(part));
+    const double e1 = difference(*pair_[0], *judge, tick_of(part), stride_);
+    const double e2 = difference(*pair_[1], *judge, tick_of(part), stride_);
+    const double order = e2 > 0 && std::isfinite(e1) ? std::clamp(std::log2(e1 / e2), 0.5, 2.0) : 2;
+    const double error = e1 * growth;
+    add_finer(velocity_verlet(), error, order, kSafety, 8);
+
+    // Its own error: first by a rule that holds for rough and smooth motion alike, then seen.
+    const bool smooth = order > 1.7;
+    const double high_order = smooth ? 3.5 : 2 * order;
+    double high_error = error / 16;
+    if (!highest_ || !(kHighSafety * high_error <= wanted_)) {
+      const Candidate finest = highest_ ? candidate(*highest_, judging, 1) : candidate(*high_, judging, 2);
+      const auto better = trial(finest);
+      reach(*better, finest, tick_of(part));
+      high_error = difference(*judge, *better, tick_of(part), stride_) * growth;
+      if (highest_) {
+        double highest_error = high_error / 4;
+        if (!(kHighSafety * high_error / std::pow(2.6, high_order) <= wanted_)) {
+          const Candidate half = candidate(*highest_, judging, 2);
+          const auto best = trial(half);
+          reach(*best, half, tick_of(part));
+          highest_error = difference(*better, *best, tick_of(part), stride_) * growth;
+        }
+        add_finer(*highest_, highest_error, smooth ? 5 : high_order, kHighSafety, 8);
+      }
+    }
+    add_finer(*high_, high_error, high_order, kHighSafety, 8);
+    choice_.reason =
+        format("velocity Verlet at its stability limit would err by %.1e m, order %.2g seen", error, order);
+  }
+
+  // The method with as many steps as its error at the limit asks for, in the precisions that rounding allows.
+  void add_finer(const Method& method, double error, double order, double safety, double most) {
+    const double finer = std::clamp(std::pow(safety * error / wanted_, 1 / order), 1.0, most);
+    for (const Precision precision : {Precision::Float, Precision::Double}) {
+      const Candidate c = candidate(method, precision, finer);
+      const double steps = double(c.substeps) / double(substeps(method, 1));
+      consider(c, std::max(error / std::pow(steps, order), kRoom * floor_of(c)));
+    }
+  }
+
+  SolverChoice trivial(const char* reason) {
+    Candidate c = candidate(velocity_verlet(), Precision::Float, 1);
+    if (floor_of(c) > wanted_) c = candidate(velocity_verlet(), Precision::Double, 1);
+    consider(c, floor_of(c));
+    choice_.reason = reason;
+    return finish();
+  }
+
+  // The cheapest that meets it, or the most accurate.
+  SolverChoice finish() {
+    std::size_t best = 0;
+    const auto better = [&](const Candidate& a, const Candidate& b) {
+      const bool a_meets = a.predicted_error <= wanted_, b_meets = b.predicted_error <= wanted_;
+      if (a_meets != b_meets) return a_meets;
+      return a_meets ? a.seconds < b.seconds : a.predicted_error < b.predicted_error;
+    };
+    for (std::size_t i = 1; i < considered_.size(); ++i)
+      if (better(considered_[i], considered_[best])) best = i;
+    static_cast<Candidate&>(choice_) = considered_[best];
+    choice_.meets = choice_.predicted_error <= wanted_;
+    choice_.dt = tick_ / double(choice_.substeps);
+    for (std::size_t i = 0; i < considered_.size(); ++i)
+      if (i != best) choice_.rejected.push_back(considered_[i]);
+    return choice_;
+  }
+
+  SoftBodySettings settings_;
+  const RunSetting& run_;
+  Index ticks_, stride_ = 1;
+  double tick_ = 0, wanted_ = 0;
+  std::vector<Limit> limits_;
+  const Method *high_ = nullptr, *highest_ = nullptr;  // of order 4 and, where there is one, 6
+  Candidate base_, pair_candidate_[2];
+  std::unique_ptr<Trial> pair_[2];
+  double share_ = 0;
+  std::vector<Candidate> considered_;
+  SolverChoice choice_;
+};
+
+}  // namespace
+
+double modelled_seconds(const SoftBodySettings& settings, const Method& method, Precision precision,
+                        double evaluations) {
+  const CostTable& table = &method == &filtered_leapfrog() ? kFilteredCost
+                           : !springs_alone(settings)      ? kDampedCost
+                           : is_grid(settings)             ? kGridCost
+                                                           : kNetworkCost;
+  const double springs = settings.network ? double(settings.network->springs.size()) : 0;
+  return 1e-9 * (precision == Precision::Float ? table.single : table.twice) *
+         (springs + double(settings.positions.rows())) * evaluations;
+}
+
+double evaluations_of(const Method& method, double ticks, double substeps) {
+  // What ends with a kick evaluates once more at a tick's end.
+  const auto* table = std::get_if<Splitting>(&method.scheme);
+  const bool kick_last = table && &method != &filtered_leapfrog() && table->drift.back() == 0;
+  return ticks * (substeps * method.evaluations + (kick_last ? 1 : 0));
+}
+
+void SolverChoice::apply(SoftBodySettings& settings) const {
+  settings.motion.method = method;
+  settings.motion.dt = dt;
+  settings.precision = precision;
+  settings.wanted_error = 0;
+}
+
+std::string SolverChoice::text() const {
+  std::string out = std::string(method->name) +
+                    format(
+                        ", %s, %ld substep%s a tick; expected error %.2g of %.2g m wanted; %.3g force evaluations, "
+                        "choosing cost %.2g of them",
+                        name_of(precision), long(substeps), substeps == 1 ? "" : "s", predicted_error, wanted_error,
+                        evaluations, seconds > 0 ? pilot_seconds / seconds : 0);
+  if (!meets) out += "; nothing meets the wanted error, this is the most accurate";
+  out += "\n" + reason;
+  for (const Candidate& c : rejected)
+    out += "; " + std::string(c.method->name) +
+           format(" %s would cost %.2g times as much and err by %.1e m", name_of(c.precision),
+                  seconds > 0 ? c.seconds / seconds : 0, c.predicted_error);
+  return out;
+}
+
+SolverChoice choose_solver(const SoftBodySettings& settings, const RunSetting& run, double wanted_error) {
+  check(settings, run);
+  if (!(wanted_error > 0) || !std::isfinite(wanted_error))
+    throw std::invalid_argument("body \"" + settings.name + "\": wanted error must be positive, got " +
+                                format("%g", wanted_error));
+  return Chooser(settings, run, wanted_error).run();
+}
+
+Verification verify(const SoftBodySettings& settings, const RunSetting& run) {
+  check(settings, run);
+  const Index ticks = ticks_of(run);
+  const auto end_of = [&](const SoftBodySettings& s) {
+    Trial trial(s, run, ticks);
+    trial.reach(ticks);
+    if (trial.done() < ticks)
+      throw Error("body \"" + settings.name + "\": " + std::string(s.motion.method->name) + " diverges at " +
+                  format("%.4g s", double(trial.done()) / run.tick_rate));
+    return trial.positions();
+  };
+  Verification out;
+  SoftBodySettings s = settings;
+  s.precision = Precision::Double;
+  s.wanted_error = 0;
+  s.motion.method = &velocity_verlet();
+  s.motion.dt = 0;
+  const auto body = make_soft_body(s);
+  const Method& method = body->motion_facts().velocity_forces ? rk4() : blanes_moan_6();
+  const double stable = kStepSafety * body->stable_step(method);
+  double steps = std::isfinite(stable) ? std::max(1.0, std::ceil(1 / run.tick_rate / stable)) : 1;
+  const Points<double> ours = end_of(settings);
+  Points<double> before;
+  s.motion.method = &method;
+  for (int level = 0; level < 7; ++level, steps *= 2) {
+    s.motion.dt = 1 / run.tick_rate / steps;
+    const Points<double> now = end_of(s);
+    out.seconds += modelled_seconds(s, method, Precision::Double, evaluations_of(method, double(ticks), steps));
+    out.error = rms(ours, now);
+    out.uncertainty = level > 0 ? rms(now, before) : kInfinity;
+    out.reference = std::string(method.name) + format(", double, %g steps a tick", steps);
+    before = now;
+    if (out.uncertainty <= 0.1 * out.error || out.uncertainty < 1e-13 * size_of(settings.positions)) break;
+  }
+  return out;
+}
+
+}  // namespace hooke::softbody
