@@ -76,6 +76,54 @@ HOOKE_INLINE void springs(SpringBlock<S>& s) {
 }
 
 template <class S>
+HOOKE_INLINE void bounds(BoundBlock<S>& s) {
+  const S *ax = s.a[0], *ay = s.a[1], *az = s.a[2], *bx = s.b[0], *by = s.b[1], *bz = s.b[2];
+  const S *wa = s.wa, *wb = s.wb, *k = s.stiffness, *rest = s.rest, *damping = s.damping;
+  S *kxx = s.k[0], *kxy = s.k[1], *kxz = s.k[2], *kyy = s.k[3], *kyz = s.k[4], *kzz = s.k[5];
+  S *cxx = s.c[0], *cxy = s.c[1], *cxz = s.c[2], *cyy = s.c[3], *cyz = s.c[4], *czz = s.c[5];
+  const int n = s.n;
+  HOOKE_INDEPENDENT
+  for (int i = 0; i < n; ++i) {
+    const S dx = bx[i] - ax[i], dy = by[i] - ay[i], dz = bz[i] - az[i];
+    const S root = std::sqrt(dx * dx + dy * dy + dz * dz);
+    const S l = root > kTiny<S> ? root : kTiny<S>;
+    // The share of the stiffness that acts across the spring; without direction, all of it.
+    const S stretched = S(1) - rest[i] / l;
+    const S side = root > kTiny<S> ? (stretched > S(0) ? stretched : S(0)) : S(1);
+    const S nx = dx / l, ny = dy / l, nz = dz / l;
+    const S weight = wa[i] + wb[i], all = weight * k[i] * side, along = weight * k[i] - all;
+    kxx[i] = along * nx * nx + all, kxy[i] = along * nx * ny, kxz[i] = along * nx * nz;
+    kyy[i] = along * ny * ny + all, kyz[i] = along * ny * nz, kzz[i] = along * nz * nz + all;
+    const S c = damping ? weight * damping[i] : S(0);
+    cxx[i] = c * nx * nx, cxy[i] = c * nx * ny, cxz[i] = c * nx * nz;
+    cyy[i] = c * ny * ny, cyz[i] = c * ny * nz, czz[i] = c * nz * nz;
+  }
+}
+
+// Newton's method on the characteristic polynomial, from a bound above all roots: it comes down on the
+// largest and never passes it.
+template <class S>
+HOOKE_INLINE void eigenvalues(int n, const S* const m[6], S* out) {
+  const S *xx = m[0], *xy = m[1], *xz = m[2], *yy = m[3], *yz = m[4], *zz = m[5];
+  HOOKE_INDEPENDENT
+  for (int i = 0; i < n; ++i) {
+    // Scaled to trace 3, so that nothing overflows.
+    const S trace = xx[i] + yy[i] + zz[i], scale = trace > S(0) ? S(3) / trace : S(0);
+    const S a = xx[i] * scale - S(1), b = yy[i] * scale - S(1), c = zz[i] * scale - S(1);
+    const S d = xy[i] * scale, e = xz[i] * scale, f = yz[i] * scale;
+    // Of the deviator: λ³ - 3 p λ - q, largest root at most 2 √p.
+    const S p = (a * a + b * b + c * c + S(2) * (d * d + e * e + f * f)) / S(6);
+    const S q = a * (b * c - f * f) - d * (d * c - f * e) + e * (d * f - b * e);
+    S root = S(2) * std::sqrt(p) * S(1.00001) + S(1e-6);
+    for (int turn = 0; turn < 8; ++turn) {
+      const S value = (root * root - S(3) * p) * root - q, slope = S(3) * (root * root - p);
+      root -= slope > S(1e-6) ? (value > S(0) ? value : S(0)) / slope : S(0);
+    }
+    out[i] = trace > S(0) ? (S(1) + root) / scale * S(1.00001) : S(0);
+  }
+}
+
+template <class S>
 HOOKE_INLINE void wind(WindBlock<S>& s) {
   const S third = S(1) / S(3);
   S *fx = s.f[0], *fy = s.f[1], *fz = s.f[2];
@@ -115,6 +163,10 @@ HOOKE_INLINE void wind(WindBlock<S>& s) {
 
 HOOKE_CLONES void spring_forces(SpringBlock<float>& block) { springs(block); }
 HOOKE_CLONES void spring_forces(SpringBlock<double>& block) { springs(block); }
+HOOKE_CLONES void spring_bounds(BoundBlock<float>& block) { bounds(block); }
+HOOKE_CLONES void spring_bounds(BoundBlock<double>& block) { bounds(block); }
+HOOKE_CLONES void eigenvalue_bounds(int n, const float* const m[6], float* out) { eigenvalues(n, m, out); }
+HOOKE_CLONES void eigenvalue_bounds(int n, const double* const m[6], double* out) { eigenvalues(n, m, out); }
 HOOKE_CLONES void wind_forces(WindBlock<float>& block) { wind(block); }
 HOOKE_CLONES void wind_forces(WindBlock<double>& block) { wind(block); }
 

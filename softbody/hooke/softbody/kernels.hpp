@@ -22,6 +22,23 @@ struct SpringBlock {
 void spring_forces(SpringBlock<float>& block);
 void spring_forces(SpringBlock<double>& block);
 
+/// Springs as above, for bounds on their rates: by spring, w k P and w c n nᵀ as xx, xy, xz, yy, yz, zz, where
+/// w = inverse masses of both ends, P the stiffness's direction and n the spring's.
+template <class S>
+struct BoundBlock {
+  int n;
+  const S *a[3], *b[3], *wa, *wb;
+  const S *stiffness, *rest, *damping;  // damping may be null
+  S k[6][kBlock], c[6][kBlock];
+};
+void spring_bounds(BoundBlock<float>& block);
+void spring_bounds(BoundBlock<double>& block);
+
+/// out[i] becomes a bound from above on the eigenvalues of the symmetric matrices m (xx, xy, xz, yy, yz, zz),
+/// within 1 % of the largest; 0 for 0.
+void eigenvalue_bounds(int n, const float* const m[6], float* out);
+void eigenvalue_bounds(int n, const double* const m[6], double* out);
+
 /// Triangles i in [0, n), n <= kBlock; corner c has positions x[c][k][i] and velocities
 /// v[c][k][i]. f[k][i] becomes a third of the aerodynamic force of the triangle; where sum is
 /// set, it is added to sum[c][k][i] for every corner.

@@ -6,7 +6,6 @@
 #include <hooke/softbody/mesh_stepper.hpp>
 #endif
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <numeric>
@@ -181,35 +180,68 @@ double SpringField<S>::potential_energy(const Points<S>& x) const {
 template <class S>
 typename ForceField<S>::Rates SpringField<S>::rate_bounds(const Points<S>& x, const Points<S>&,
                                                           const Values<S>& inverse_mass) const {
-  using Symmetric = Eigen::Matrix3d;
-  std::vector<Symmetric> stiffness(std::size_t(x.rows()), Symmetric::Zero());
-  std::vector<Symmetric> damping(damped_ ? std::size_t(x.rows()) : 0, Symmetric::Zero());
-  for (Index i = 0; i < size(); ++i) {
-    const int a = a_[std::size_t(i)], b = b_[std::size_t(i)];
-    const double weight = double(inverse_mass[a]) + double(inverse_mass[b]);
-    const Unit<S> unit = direction(x, a, b);
-    const Vec3 n = unit.n.template cast<double>();
-    const Symmetric along = n * n.transpose();
-    const double side = unit.length > S(0) ? std::max(0.0, double(across(unit, rest_[i]))) : 1.0;
-    const Symmetric k = double(stiffness_[i]) * weight * ((1 - side) * along + side * Symmetric::Identity());
-    const Symmetric c = double(damping_[i]) * weight * along;
-    for (const int point : {a, b}) {
-      if (inverse_mass[point] == S(0)) continue;
-      stiffness[std::size_t(point)] += k;
-      if (damped_) damping[std::size_t(point)] += c;
+  const Index points = x.rows();
+  for (auto* sums : {&bound_sums_, damped_ ? &damping_sums_ : nullptr})
+    if (sums) sums->setZero(points, 6);
+  BoundBlock<S> block;
+  const auto parameters = [&](Index first, int n) {
+    block.n = n;
+    block.stiffness = stiffness_.data() + first;
+    block.rest = rest_.data() + first;
+    block.damping = damped_ ? damping_.data() + first : nullptr;
+  };
+  const auto add = [](auto& sums, const S(&values)[6][kBlock], Index at, int n) {
+    for (int k = 0; k < 6; ++k) {
+      S* to = sums.col(k).data() + at;
+      for (int i = 0; i < n; ++i) to[i] += values[k][i];
     }
+  };
+  for (const Run& run : runs_)
+    for (Index done = 0; done < run.count; done += kBlock) {
+      parameters(run.first + done, int(std::min<Index>(kBlock, run.count - done)));
+      const Index a = run.a + done, b = run.b + done;
+      for (int k = 0; k < 3; ++k) block.a[k] = x.col(k).data() + a, block.b[k] = x.col(k).data() + b;
+      block.wa = inverse_mass.data() + a, block.wb = inverse_mass.data() + b;
+      spring_bounds(block);
+      for (const Index end : {a, b}) {
+        add(bound_sums_, block.k, end, block.n);
+        if (damped_) add(damping_sums_, block.c, end, block.n);
+      }
+    }
+  S gathered[8][kBlock];
+  for (int k = 0; k < 3; ++k) block.a[k] = gathered[k], block.b[k] = gathered[3 + k];
+  block.wa = gathered[6], block.wb = gathered[7];
+  for (Index first = loose_; first < size(); first += kBlock) {
+    const int n = int(std::min<Index>(kBlock, size() - first));
+    const int *a = a_.data() + first, *b = b_.data() + first;
+    parameters(first, n);
+    for (int i = 0; i < n; ++i) {
+      for (int k = 0; k < 3; ++k) gathered[k][i] = x(a[i], k), gathered[3 + k][i] = x(b[i], k);
+      gathered[6][i] = inverse_mass[a[i]], gathered[7][i] = inverse_mass[b[i]];
+    }
+    spring_bounds(block);
+    for (int k = 0; k < 6; ++k)
+      for (int i = 0; i < n; ++i)
+        for (const int point : {a[i], b[i]}) {
+          bound_sums_(point, k) += block.k[k][i];
+          if (damped_) damping_sums_(point, k) += block.c[k][i];
+        }
   }
-  const auto largest = [](const std::vector<Symmetric>& matrices) {
+  // Only rows of free points count.
+  const auto largest = [&](const Eigen::Array<S, Eigen::Dynamic, 6>& sums) {
     double found = 0;
-    Eigen::SelfAdjointEigenSolver<Symmetric> solver;
-    for (const Symmetric& m : matrices) {
-      if (m.cwiseAbs().rowwise().sum().maxCoeff() <= found) continue;
-      solver.computeDirect(m, Eigen::EigenvaluesOnly);
-      found = std::max(found, solver.eigenvalues()[2]);
+    S bounds[kBlock];
+    for (Index first = 0; first < points; first += kBlock) {
+      const int n = int(std::min<Index>(kBlock, points - first));
+      const S* columns[6];
+      for (int k = 0; k < 6; ++k) columns[k] = sums.col(k).data() + first;
+      eigenvalue_bounds(n, columns, bounds);
+      for (int i = 0; i < n; ++i)
+        if (inverse_mass[first + i] != S(0)) found = std::max(found, double(bounds[i]));
     }
     return found;
   };
-  return {largest(stiffness), largest(damping)};
+  return {largest(bound_sums_), damped_ ? largest(damping_sums_) : 0};
 }
 
 template <class S>

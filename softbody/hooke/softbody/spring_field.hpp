@@ -49,6 +49,8 @@ class SpringField final : public ForceField<S> {
   Index loose_ = 0;  // springs from here on are in no run
   std::vector<int> a_, b_;
   Values<S> stiffness_, rest_, rest_squared_, damping_;
+  // Scratch of rate_bounds; a field belongs to one body and is asked by one thread at a time.
+  mutable Eigen::Array<S, Eigen::Dynamic, 6> bound_sums_, damping_sums_;
 };
 
 extern template class SpringField<float>;
