@@ -19,6 +19,12 @@ constexpr double kOrdinary = 1e9;
 // Methods without a stable step still need one: ω h of this.
 constexpr double kUnstablePhase = 0.05;
 
+// As allFinite, in vector code: what is not finite makes NaN of its product with zero.
+template <class S>
+bool finite(const Points<S>& p) {
+  return (p * S(0)).sum() == S(0);
+}
+
 void check_finite(const Vec3& value, const char* what) {
   if (!value.allFinite()) throw std::invalid_argument(std::string(what) + " must be finite");
 }
@@ -404,7 +410,7 @@ SolveResult PointBody<S>::run_tick() {
 // What went wrong in tick_, and the state from before it. NaN spreads from point to point
 // within a tick, so the tick is run again under watch for where it came from.
 template <class S>
-StepReport PointBody<S>::explain(bool finite) {
+StepReport PointBody<S>::explain(bool finite_state) {
   StepReport report;
   report.body = name();
   report.time = tick_.start;
@@ -416,7 +422,7 @@ StepReport PointBody<S>::explain(bool finite) {
   run_tick();
   watching_ = false;
   take_back();
-  const bool solver_failed = finite && !fields_at_fault_;
+  const bool solver_failed = finite_state && !fields_at_fault_;
   report.status = solver_failed ? StepReport::Status::NotConverged : StepReport::Status::NotFinite;
   if (!solver_failed) report.point = culprit_ >= 0 ? culprit_ : broken;
   if (fields_at_fault_) {
@@ -444,8 +450,8 @@ StepReport PointBody<S>::advance(const Tick& tick) {
   spend_bank(tick.end - tick.start);
   hold_fields(tick.start);
   const SolveResult solve = run_tick();
-  const bool finite = points_.position.allFinite() && points_.velocity.allFinite();
-  if (!finite || !solve.converged) return explain(finite);
+  const bool good = finite(points_.position) && finite(points_.velocity);
+  if (!good || !solve.converged) return explain(good);
   if (!moving_.empty() && tick.end >= frame_end_) {
     for (const Moving& pin : moving_) points_.velocity.row(pin.point).setZero();
     moving_.clear();

@@ -124,7 +124,7 @@ class PointBody : public Body, protected Dynamics<S> {
   void hold(Index point);
   SolveResult run_tick();
   bool run_fast();
-  StepReport explain(bool finite);
+  StepReport explain(bool finite_state);
 
   MotionSettings settings_;
   Integrator<S> integrator_;
