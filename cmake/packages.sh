@@ -48,4 +48,5 @@ hooke_build_packages=(
   assimp-testmodels                                        # a recorded human motion
 )
 hooke_report_packages=(gnuplot-nox libbullet-dev) # pictures and a rival; the report goes on without
+hooke_bench_packages=(libbenchmark-dev) # times of single kernels; the other benchmarks go on without
 hooke_test_packages=(libgtest-dev libgmock-dev)
