@@ -14,7 +14,9 @@ namespace hooke::command {
 struct SimulateOptions {
   RunOptions run;
   std::filesystem::path out;
-  std::string export_format;  ///< empty: none
+  std::string export_format;   ///< empty: none
+  bool estimate_error = true;  ///< by halving the steps of a first part
+  bool verify = false;         ///< by a converged run
 };
 int simulate(const SimulateOptions& options);
 

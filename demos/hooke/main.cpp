@@ -27,7 +27,7 @@ struct Arguments {
   RenderOptions render;
   ReportOptions report;
   std::string validate_scene, size;
-  bool resume = false, list = false;
+  bool resume = false, list = false, no_estimate = false;
 };
 
 void add_run_options(CLI::App& command, RunOptions& run) {
@@ -70,6 +70,12 @@ int dispatch(int argc, char** argv) {
   simulate_command->add_option("--out", a.simulate.out, "Folder for state.csv, diagnostics.csv and timings.csv")
       ->required();
   simulate_command->add_option("--export", a.simulate.export_format, "Moving meshes as well: obj, ply or pc2");
+  simulate_command->add_option(
+      "--error", a.simulate.run.error,
+      "Wanted error at the end, a share of each body's size: picks method, precision and step");
+  simulate_command->add_flag("--no-error-estimate", a.no_estimate, "Spares the error estimate, 0.19 of the run's cost");
+  simulate_command->add_flag("--verify", a.simulate.verify,
+                             "Tells the true error by a converged run; costs tens of times the run");
   simulate_command->add_flag("--resume", a.resume, "Not available: there are no checkpoints yet");
   simulate_command->footer(
       "Example: hooke simulate hanging-sheet-32 --method velocity-verlet --precision double --out sheet");
@@ -113,6 +119,15 @@ int dispatch(int argc, char** argv) {
   if (simulate_command->parsed()) {
     if (a.resume) throw Error("--resume is not available: runs leave no checkpoints yet; run again without it");
     check(*simulate_command, a.simulate.run);
+    if (simulate_command->count("--error")) {
+      const double error = a.simulate.run.error;
+      if (!(error > 0 && std::isfinite(error)))
+        throw Error("--error must be positive, a share of the body's size, got " + std::to_string(error));
+      for (const char* name : {"--method", "--dt", "--precision"})
+        if (simulate_command->count(name))
+          throw Error(std::string("--error chooses what ") + name + " gives; use one of them");
+    }
+    a.simulate.estimate_error = !a.no_estimate;
     return simulate(a.simulate);
   }
   if (render_command->parsed()) {

@@ -62,7 +62,10 @@ scene::Scene prepare(const RunOptions& options) {
   if (options.threads < 1 || options.threads > 1024)
     throw Error("--threads must be from 1 to 1024, got " + std::to_string(options.threads));
   scene::SceneDescription description = scene::find_scene(options.scene);
-  scene::override_solver(description, options.method, options.dt, options.precision);
+  if (options.error > 0)
+    scene::choose_solvers(description, options.error);
+  else
+    scene::override_solver(description, options.method, options.dt, options.precision);
   if (options.end > 0) description.duration = options.end;
   scene::Scene scene = scene::build(description);
   use_threads(scene.world, options.threads);

@@ -19,6 +19,7 @@ struct RunOptions {
   std::string scene;
   std::string method, precision;
   double dt = 0, end = 0;  ///< [s]
+  double error = 0;        ///< wanted, a share of each body's size
   int threads = 1;
 };
 

@@ -1,8 +1,11 @@
 #include "commands.hpp"
 
+#include <hooke/error.hpp>
 #include <hooke/io/mesh_cache.hpp>
 #include <hooke/io/tables.hpp>
+#include <scene/accuracy.hpp>
 
+#include <algorithm>
 #include <cstdio>
 #include <memory>
 #include <set>
@@ -70,6 +73,43 @@ class Outputs {
   std::vector<std::unique_ptr<io::MeshCache>> caches_;
 };
 
+void print_choices(const scene::Scene& scene) {
+  std::printf("%s", chosen(scene).c_str());
+  for (const scene::SceneBody& body : scene.bodies)
+    if (body.choice) std::printf("%s: %s\n", body.body->name().c_str(), body.choice->text().c_str());
+  std::fflush(stdout);
+}
+
+// By the chooser where it was asked, else by a part of the run with half the steps.
+void print_estimates(const scene::Scene& scene) {
+  bool all = true;
+  for (const scene::SceneBody& body : scene.bodies) {
+    all = all && body.choice;
+    if (body.choice)
+      std::printf("%s: error estimate %.2g m, %.2g of its size, from the chooser's trials\n", body.body->name().c_str(),
+                  body.choice->predicted_error, body.choice->predicted_error / body.choice->size);
+  }
+  if (all) return;
+  try {
+    const scene::ErrorEstimate estimate = scene::estimate_errors(scene);
+    for (std::size_t i = 0; i < scene.bodies.size(); ++i)
+      if (!scene.bodies[i].choice)
+        std::printf(
+            "%s: error estimate %.2g m, %.2g of its size, from half the step over the first %.3g of the run; cost "
+            "%.2g of the run\n",
+            estimate.bodies[i].body.c_str(), estimate.bodies[i].error,
+            estimate.bodies[i].error / estimate.bodies[i].size, estimate.part, estimate.cost);
+  } catch (const Error& error) {
+    std::printf("no error estimate: %s\n", error.what());
+  }
+}
+
+void print_verification(const scene::Scene& scene) {
+  for (const scene::Accuracy& body : scene::verify_errors(scene))
+    std::printf("%s: true error %.2g m, %.2g of its size (reference settled to %.1g m)\n", body.body.c_str(),
+                body.error, body.error / body.size, body.uncertainty);
+}
+
 }  // namespace
 
 int simulate(const SimulateOptions& options) {
@@ -83,16 +123,18 @@ int simulate(const SimulateOptions& options) {
     outputs.add(scene, ms);
     if (frame == 0 || told) return;
     told = true;
-    std::printf("%s", chosen(scene).c_str());
-    std::fflush(stdout);
+    print_choices(scene);
   });
-  if (!told) std::printf("%s", chosen(scene).c_str());
+  if (!told) print_choices(scene);
   outputs.finish(scene);
   std::printf("%s", summary(result).c_str());
   if (!result.report.good()) std::fprintf(stderr, "hooke: %s\n", result.report.text().c_str());
   if (result.interrupted)
     std::fprintf(stderr, "hooke: interrupted at %.6g s; what is finished is in %s\n", result.shown_time,
                  options.out.c_str());
+  const bool whole = result.exit_code() == kDone;
+  if (options.estimate_error && whole) print_estimates(scene);
+  if (options.verify && whole) print_verification(scene);
   return result.exit_code();
 }
 

@@ -223,6 +223,10 @@ class Builder {
     out.inside_color = description.inside_color;
     if (cape) wear(*cape, out);
     drive_pins(description, lattice, *body, out);
+    if (description.solver.error > 0) {
+      told_at(d_, description.path + ".solver.error", [&] { choose(description.solver.error, settings, out); });
+      body = softbody::make_soft_body(settings);
+    }
     if (!out.driven.empty())
       told_at(d_, description.path + ".pin_motion", [&] { body->drive_pins(out.driven, out.targets); });
     out.held.resize(std::size_t(count));
@@ -230,6 +234,18 @@ class Builder {
     out.body = body.get();
     scene_.world.add(std::move(body));
     scene_.bodies.push_back(std::move(out));
+  }
+
+  void choose(double error, softbody::SoftBodySettings& settings, SceneBody& out) const {
+    softbody::RunSetting run;
+    run.gravity = d_.gravity;
+    run.duration = d_.preroll + d_.duration;
+    run.tick_rate = d_.tick_rate;
+    run.damping = d_.damping;
+    run.colliders = scene_.world.colliders();
+    if (!out.driven.empty()) run.prepare = [&out](Body& body) { body.drive_pins(out.driven, out.targets); };
+    out.choice = softbody::choose_solver(settings, run, error);
+    out.choice->apply(settings);
   }
 
   Cape dress_human(const SoftBody& description, const CapeCut& cut, SceneBody& out) {
@@ -303,8 +319,16 @@ void override_solver(SceneDescription& description, const std::string& method, d
     if (!method.empty()) body.solver.method = method;
     if (dt > 0 || body.solver.method != softbody::filtered_leapfrog().name) body.solver.wanted_error = 0;
     if (dt > 0) body.solver.dt = dt;
+    if (!method.empty() || dt > 0 || !precision.empty()) body.solver.error = 0;
     if (!precision.empty())
       body.solver.precision = precision == "float" ? softbody::Precision::Float : softbody::Precision::Double;
+  }
+}
+
+void choose_solvers(SceneDescription& description, double error) {
+  for (SoftBody& body : description.bodies) {
+    body.solver = {};
+    body.solver.error = error;
   }
 }
 

@@ -65,6 +65,7 @@ struct FixedMaterial {
 using Material = std::variant<softbody::ClothMaterial, FixedMaterial>;
 
 struct Solver {
+  double error = 0;  ///< wanted, as a share of the body's size: the chooser picks all below; 0: they are given
   std::string method = "velocity-verlet";
   double dt = 0;            ///< [s]; 0: automatic
   double tolerance = 1e-6;  ///< of adaptive methods with dt = 0 [m], as MotionSettings::tolerance

@@ -216,6 +216,12 @@ softbody::Wind read_wind(const Object& object) {
 
 Solver read_solver(const Object& object) {
   Solver solver;
+  if (const auto error = object.find("error")) {
+    for (const char* key : {"method", "dt", "wanted_error", "precision"})
+      if (object.has(key)) object[key].fail("is chosen where an \"error\" is wanted; give one or the other");
+    solver.error = error->number(Range::positive());
+    return solver;
+  }
   std::vector<std::string> names;
   for (const Method* method : methods()) names.emplace_back(method->name);
   names.emplace_back(softbody::filtered_leapfrog().name);

@@ -126,7 +126,7 @@ const KeyTable& key_table() {
        {"velocity", "gust", "gust_period", "swing", "stop", "fade", "air_density", "drag", "lift", "seed",
         "once_a_tick"}},
       {"drag", {"linear", "quadratic"}},
-      {"solver", {"method", "dt", "wanted_error", "precision"}},
+      {"solver", {"error", "method", "dt", "wanted_error", "precision"}},
       {"half_space", {"type", "name", "normal", "offset", "friction", "restitution"}},
       {"sphere", {"type", "name", "center", "radius", "motion", "friction", "restitution", "color"}},
       {"capsule", {"type", "name", "a", "b", "radius", "motion", "friction", "restitution", "color"}},

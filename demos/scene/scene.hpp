@@ -2,6 +2,7 @@
 // and measure it.
 #pragma once
 
+#include <hooke/softbody/choose_solver.hpp>
 #include <hooke/world.hpp>
 #include <scene/description.hpp>
 #include <scene/parse.hpp>
@@ -24,9 +25,10 @@ struct SceneBody {
   std::vector<bool> held;    ///< by point: pinned or driven
   double thickness = 0;      ///< [m]
   std::optional<Vec3> color, inside_color;
-  std::vector<Index> driven;  ///< points that follow `targets`
-  PinMotion targets;          ///< empty where nothing is driven
-  int wears = -1;             ///< a cape: which of Scene::humans carries it
+  std::vector<Index> driven;                     ///< points that follow `targets`
+  PinMotion targets;                             ///< empty where nothing is driven
+  int wears = -1;                                ///< a cape: which of Scene::humans carries it
+  std::optional<softbody::SolverChoice> choice;  ///< where the scene names a wanted error
 };
 
 struct SceneHuman {
@@ -53,5 +55,8 @@ Scene build(const SceneDescription& description, const Scene* reuse = nullptr);
 
 /// Sets the solver of every body: what is given on the command line.
 void override_solver(SceneDescription& description, const std::string& method, double dt, const std::string& precision);
+
+/// Lets the chooser pick the solver of every body: `error` is a share of each body's size, > 0.
+void choose_solvers(SceneDescription& description, double error);
 
 }  // namespace hooke::scene

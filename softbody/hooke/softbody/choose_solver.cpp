@@ -29,6 +29,8 @@ constexpr double kLeastGrowth = 0.5, kMostGrowth = 2.5;
 constexpr double kDoubt = 0.75;
 // Filtered leapfrog is for errors from this share of the size on; its trials may cost so much of velocity Verlet's run.
 constexpr double kFilteredFrom = 3e-4, kFilteredBudget = 0.35, kQuietBudget = 0.08;
+// Of the rejected ones so many are told in words, those first that cost the least more.
+constexpr std::size_t kRejectedTold = 3;
 // Trials keep at most so many states.
 constexpr Index kMostStates = 64;
 
@@ -39,7 +41,7 @@ std::string format(const char* pattern, Values... values) {
   return text;
 }
 
-const char* name_of(Precision precision) { return precision == Precision::Float ? "float" : "double"; }
+const char* word_of(Precision precision) { return precision == Precision::Float ? "float" : "double"; }
 
 double rms(const Points<double>& a, const Points<double>& b) {
   return std::sqrt((a - b).square().rowwise().sum().mean());
@@ -126,12 +128,13 @@ double difference(const Trial& a, const Trial& b, Index tick, Index stride) {
 
 // What an error that was seen up to a share of the run becomes at its end.
 struct Forecast {
-  double likely = 0, high = 0;
+  double low = 0, likely = 0, high = 0;
 
-  Forecast(double seen, double seen_at_half, double share) {
+  Forecast(double seen, double seen_at_half, double share, double least) {
     const double slope = seen_at_half > 0 && std::isfinite(seen) ? std::log2(seen / seen_at_half) : 1;
-    const double power = std::clamp(slope, kLeastGrowth, kMostGrowth);
+    const double power = std::clamp(slope, least, kMostGrowth);
     likely = seen * std::pow(1 / share, power);
+    low = seen * std::pow(1 / share, std::max(least, power - kDoubt));
     high = likely * std::pow(1 / share, kDoubt);
   }
 };
@@ -150,7 +153,7 @@ class Chooser {
     choice_.wanted_error = wanted_ = wanted_error * choice_.size;
     const auto body = make_soft_body(settings_);
     if (run.prepare) run.prepare(*body);
-    for (const Method* method : {&velocity_verlet(), &pefrl(), &blanes_moan_6(), &rk4()})
+    for (const Method* method : {&velocity_verlet(), &semi_implicit_euler(), &pefrl(), &blanes_moan_6(), &rk4()})
       limits_.push_back({method, body->stable_step(*method)});
     high_ = body->motion_facts().velocity_forces ? &rk4() : &pefrl();
     highest_ = high_ == &pefrl() ? &blanes_moan_6() : nullptr;
@@ -200,7 +203,10 @@ class Chooser {
   double floor_of(const Candidate& c) const {
     const double stages = c.method == &velocity_verlet() ? 1 : 2;
     const double share = c.precision == Precision::Float ? kFloatFloor : kFloatFloor * 2e-9;
-    return share * choice_.size * std::sqrt(stages * double(ticks_) * double(c.substeps));
+    // A chain has no neighbours that even out its rounding.
+    const double springs = settings_.network ? double(settings_.network->springs.size()) : 0;
+    const double alone = springs < 1.5 * double(settings_.positions.rows()) ? 10 : 1;
+    return alone * share * choice_.size * std::sqrt(stages * double(ticks_) * double(c.substeps));
   }
 
   std::unique_ptr<Trial> trial(const Candidate& c) const {
@@ -302,7 +308,13 @@ class Chooser {
     return seen < 3 * rounding ? seen / std::sqrt(3.0) : 1.5 * seen;
   }
 
-  Forecast forecast() const { return {pair_error(share_), pair_error(share_ / 2), shown(share_)}; }
+  // Dampers let errors settle; rounding adds up faster than it is seen to begin with.
+  Forecast forecast() const {
+    const double seen = pair_error(share_);
+    const bool rounding = seen < 3 * std::sqrt(shown(share_)) * floor_of(pair_candidate_[0]);
+    const double least = rounding ? 0.75 : highest_ ? kLeastGrowth : 0.0;
+    return {seen, pair_error(share_ / 2), shown(share_), least};
+  }
 
   void look_at_velocity_verlet() {
     const Method& method = velocity_verlet();
@@ -312,6 +324,7 @@ class Chooser {
     pair_candidate_[0] = base, pair_candidate_[1] = candidate(method, precision, 2);
     for (int i : {0, 1}) pair_[i] = trial(pair_candidate_[i]);
     const auto enough = [&](double error, const char* how) {
+      try_semi_implicit_euler(precision);
       consider(base, std::max(error, floor_of(base)));
       choice_.reason =
           format("seen over the first %.3g of the run, velocity Verlet at its stability limit errs by %s %.1e m",
@@ -322,15 +335,26 @@ class Chooser {
       const Forecast now = forecast();
       if (kSafety * now.high <= wanted_) return enough(now.high, "less than");
       // Clearly not: what comes is dearer and looked at in its own way.
-      if (!(now.likely <= 8 * kSafety * wanted_)) break;
+      if (!(now.low <= 2 * wanted_)) break;
     }
     const Forecast now = forecast();
     if (kSafety * now.likely <= wanted_) return enough(now.likely, "about");
     refine(now);
   }
 
+  // Dampers let semi-implicit Euler take longer steps than velocity Verlet.
+  void try_semi_implicit_euler(Precision precision) {
+    const Candidate c = candidate(semi_implicit_euler(), precision, 1);
+    if (c.seconds > 0.85 * pair_candidate_[0].seconds) return;
+    const auto euler = trial(c);
+    reach(*euler, c, tick_of(share_));
+    const auto seen = [&](double share) { return difference(*euler, *pair_[1], tick_of(share), stride_); };
+    const Forecast error(seen(share_), seen(share_ / 2), shown(share_), highest_ ? kLeastGrowth : 0.0);
+    if (kSafety * error.high <= wanted_) consider(c, std::max(error.likely, floor_of(c)));
+  }
+
   // Velocity Verlet at its limit is not enough.
-  void refine(const Forecast& seen) {
+  void refine(Forecast seen) {
     const Precision precision = pair_candidate_[0].precision;
     if (share_ >= 0.25 && kSafety * seen.likely <= 2 * wanted_) {
       // At order 1 the pair tells three quarters of the error.
@@ -342,6 +366,10 @@ class Chooser {
                  shown(share_), seen.likely);
       return;
     }
+    if (share_ < 1.0 / 8) {
+      extend_pair(1.0 / 8);
+      seen = forecast();
+    }
     // Where what is needed costs several times more, the growth of errors is looked at to the end.
     const double finer = std::min(3.0, std::sqrt(kSafety * seen.likely / wanted_));
     const double needed =
@@ -352,7 +380,6 @@ class Chooser {
 
     // The next order as judge of both, over a first part.
     const double part = 1.0 / 8;
-    if (share_ < part) extend_pair(part);
     const double here = pair_error(part);
     const double growth = here > 0 && std::isfinite(whole) ? std::max(1.0, whole / here) : 1;
     // In float the differences would be its rounding.
@@ -424,6 +451,8 @@ class Chooser {
     choice_.dt = tick_ / double(choice_.substeps);
     for (std::size_t i = 0; i < considered_.size(); ++i)
       if (i != best) choice_.rejected.push_back(considered_[i]);
+    std::stable_sort(choice_.rejected.begin(), choice_.rejected.end(),
+                     [](const Candidate& a, const Candidate& b) { return a.seconds < b.seconds; });
     return choice_;
   }
 
@@ -472,14 +501,16 @@ std::string SolverChoice::text() const {
                     format(
                         ", %s, %ld substep%s a tick; expected error %.2g of %.2g m wanted; %.3g force evaluations, "
                         "choosing cost %.2g of them",
-                        name_of(precision), long(substeps), substeps == 1 ? "" : "s", predicted_error, wanted_error,
+                        word_of(precision), long(substeps), substeps == 1 ? "" : "s", predicted_error, wanted_error,
                         evaluations, seconds > 0 ? pilot_seconds / seconds : 0);
   if (!meets) out += "; nothing meets the wanted error, this is the most accurate";
   out += "\n" + reason;
-  for (const Candidate& c : rejected)
+  for (std::size_t i = 0; i < std::min(rejected.size(), kRejectedTold); ++i) {
+    const Candidate& c = rejected[i];
     out += "; " + std::string(c.method->name) +
-           format(" %s would cost %.2g times as much and err by %.1e m", name_of(c.precision),
+           format(" %s would cost %.2g times as much and err by %.1e m", word_of(c.precision),
                   seconds > 0 ? c.seconds / seconds : 0, c.predicted_error);
+  }
   return out;
 }
 

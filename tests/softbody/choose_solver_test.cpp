@@ -1,0 +1,163 @@
+// The chooser: what it picks, what it refuses, and what it says.
+#include <hooke/softbody/choose_solver.hpp>
+#include <hooke/world.hpp>
+
+#include <gmock/gmock.h>
+
+#include <cmath>
+#include <limits>
+
+namespace hooke::softbody {
+namespace {
+
+// The hanging sheet of n × n points, side 1 m, tilted by 45 degrees.
+SoftBodySettings sheet(int n, double damping = 0) {
+  SoftBodySettings s;
+  s.positions.resize(n * n, 3);
+  SpringNetwork net;
+  const double d = 1.0 / (n - 1), c = std::sqrt(0.5);
+  const auto join = [&](int a, int b, double k) {
+    Spring spring;
+    spring.a = a, spring.b = b, spring.stiffness = k, spring.damping = damping;
+    net.springs.push_back(spring);
+  };
+  for (int row = 0; row < n; ++row)
+    for (int column = 0; column < n; ++column) {
+      const int i = row * n + column;
+      s.positions.row(i) << d * column, -c * d * row, c * d * row;
+      if (column + 1 < n) join(i, i + 1, 500);
+      if (row + 1 < n) join(i, i + n, 500);
+      if (row + 1 < n && column + 1 < n) join(i, i + n + 1, 100), join(i + 1, i + n, 100);
+      if (column + 2 < n) join(i, i + 2, 5);
+      if (row + 2 < n) join(i, i + 2 * n, 5);
+    }
+  s.masses = Values<double>::Constant(n * n, 0.3 / (n * n));
+  s.network = std::make_shared<SpringNetwork>(net);
+  for (int i = 0; i < n; ++i) s.pins.push_back(i);
+  return s;
+}
+
+RunSetting half_a_second() {
+  RunSetting run;
+  run.duration = 0.5;
+  return run;
+}
+
+TEST(Chooser, PicksTheSameEveryTime) {
+  const SoftBodySettings body = sheet(16);
+  const SolverChoice a = choose_solver(body, half_a_second(), 1e-5);
+  SoftBodySettings other = body;
+  other.motion.method = &rk4(), other.motion.dt = 1e-3, other.precision = Precision::Double;  // not looked at
+  const SolverChoice b = choose_solver(other, half_a_second(), 1e-5);
+  EXPECT_EQ(a.method, b.method);
+  EXPECT_EQ(a.precision, b.precision);
+  EXPECT_EQ(a.dt, b.dt);
+  EXPECT_EQ(a.predicted_error, b.predicted_error);
+  EXPECT_EQ(a.pilot_evaluations, b.pilot_evaluations);
+  EXPECT_EQ(a.text(), b.text());
+}
+
+TEST(Chooser, SmallerErrorsAreNeverCheaperAndAreMet) {
+  const SoftBodySettings body = sheet(24);
+  double cost = 0;
+  for (const double wanted : {1e-1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7}) {
+    const SolverChoice choice = choose_solver(body, half_a_second(), wanted);
+    EXPECT_TRUE(choice.meets) << wanted;
+    EXPECT_GE(choice.seconds, cost) << wanted << ": " << choice.text();
+    EXPECT_LE(choice.predicted_error, choice.wanted_error);
+    cost = choice.seconds;
+    SoftBodySettings chosen = body;
+    choice.apply(chosen);
+    const Verification truth = verify(chosen, half_a_second());
+    EXPECT_TRUE(truth.converged()) << wanted;
+    EXPECT_LE(truth.error, choice.wanted_error) << choice.text();
+  }
+}
+
+TEST(Chooser, CountsTheForceEvaluationsOfTheRun) {
+  const SoftBodySettings body = sheet(12);
+  for (const double wanted : {1e-2, 1e-4, 1e-6, 1e-7}) {
+    const SolverChoice choice = choose_solver(body, half_a_second(), wanted);
+    SoftBodySettings chosen = body;
+    choice.apply(chosen);
+    World world;
+    Body& moved = world.add(make_soft_body(chosen));
+    ASSERT_TRUE(world.update(0.5).good());
+    EXPECT_NEAR(double(moved.motion_facts().evaluations), choice.evaluations, 1) << choice.text();
+    EXPECT_EQ(moved.motion_facts().substeps, choice.substeps);
+  }
+}
+
+TEST(Chooser, TakesTheSizeFromTheStart) {
+  const SolverChoice choice = choose_solver(sheet(8), half_a_second(), 1e-3);
+  EXPECT_NEAR(choice.size, std::sqrt(2.0), 1e-12);
+  EXPECT_NEAR(choice.wanted_error, 1e-3 * std::sqrt(2.0), 1e-15);
+}
+
+TEST(Chooser, GivesDampersToMethodsThatTakeThem) {
+  for (const double wanted : {1e-2, 1e-4, 1e-6, 1e-7}) {
+    const SolverChoice choice = choose_solver(sheet(12, 0.002), half_a_second(), wanted);
+    EXPECT_TRUE(choice.method->accepts_velocity_forces) << choice.text();
+    for (const Candidate& c : choice.rejected) EXPECT_TRUE(c.method->accepts_velocity_forces);
+    SoftBodySettings chosen = sheet(12, 0.002);
+    choice.apply(chosen);
+    const Verification truth = verify(chosen, half_a_second());
+    EXPECT_LE(truth.error, choice.wanted_error) << choice.text();
+  }
+}
+
+TEST(Chooser, SaysSoWhereNothingMeetsIt) {
+  const SolverChoice choice = choose_solver(sheet(8), half_a_second(), 1e-17);
+  EXPECT_FALSE(choice.meets);
+  EXPECT_THAT(choice.text(), ::testing::HasSubstr("nothing meets the wanted error"));
+  EXPECT_EQ(choice.precision, Precision::Double);
+  for (const Candidate& c : choice.rejected) EXPECT_GE(c.predicted_error, choice.predicted_error);
+}
+
+TEST(Chooser, TellsItsReasonAndWhatItRejected) {
+  const SolverChoice choice = choose_solver(sheet(16), half_a_second(), 1e-7);
+  EXPECT_THAT(choice.text(), ::testing::HasSubstr(std::string(choice.method->name)));
+  EXPECT_THAT(choice.text(), ::testing::HasSubstr("force evaluations"));
+  EXPECT_FALSE(choice.reason.empty());
+  EXPECT_FALSE(choice.rejected.empty());
+  EXPECT_GT(choice.pilot_evaluations, 0);
+}
+
+TEST(Chooser, LeavesPointsWithoutSpringsToTheTick) {
+  SoftBodySettings body;
+  body.positions = Points<double>::Random(5, 3);
+  body.masses = Values<double>::Constant(5, 1.0);
+  const SolverChoice choice = choose_solver(body, half_a_second(), 1e-3);
+  EXPECT_TRUE(choice.meets);
+  EXPECT_EQ(choice.substeps, 1);
+}
+
+TEST(Chooser, RefusesBadInput) {
+  const double nan = std::numeric_limits<double>::quiet_NaN(), infinity = std::numeric_limits<double>::infinity();
+  for (const double wanted : {0.0, -1e-3, nan, infinity})
+    EXPECT_THROW(choose_solver(sheet(4), half_a_second(), wanted), std::invalid_argument) << wanted;
+  for (const double bad : {0.0, -1.0, nan, infinity}) {
+    RunSetting run = half_a_second();
+    run.duration = bad;
+    EXPECT_THROW(choose_solver(sheet(4), run, 1e-3), std::invalid_argument) << bad;
+    run = half_a_second();
+    run.tick_rate = bad;
+    EXPECT_THROW(choose_solver(sheet(4), run, 1e-3), std::invalid_argument) << bad;
+  }
+}
+
+TEST(Verify, FindsTheErrorOfACoarseRun) {
+  // Semi-implicit Euler near its limit errs far more than velocity Verlet there.
+  SoftBodySettings body = sheet(12);
+  body.precision = Precision::Double;
+  body.motion.method = &semi_implicit_euler();
+  const Verification euler = verify(body, half_a_second());
+  body.motion.method = &velocity_verlet();
+  const Verification verlet = verify(body, half_a_second());
+  EXPECT_TRUE(euler.converged());
+  EXPECT_TRUE(verlet.converged());
+  EXPECT_GT(euler.error, 10 * verlet.error);
+}
+
+}  // namespace
+}  // namespace hooke::softbody
