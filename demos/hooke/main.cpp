@@ -34,7 +34,7 @@ void add_run_options(CLI::App& command, RunOptions& run) {
   command.add_option("scene", run.scene, "Scene file, or the name of a scene (hooke list)")->required();
   command.add_option("--method", run.method, "Integration method of every body, e.g. velocity-verlet");
   command.add_option("--dt", run.dt, "Largest substep [s]; without it from the largest stable one");
-  command.add_option("--precision", run.precision, "float or double");
+  command.add_option("--precision", run.precision, "float, double or double-float");
   command.add_option("--end", run.end, "Simulated time [s] instead of the scene's duration");
   command.add_option("--threads", run.threads, "Threads that move bodies; one body is moved by one thread");
 }

@@ -40,6 +40,7 @@ std::string format(const char* pattern, Values... values) {
 
 void use_threads(World& world, int threads) {
   if (threads <= 1) return;
+  world.set_threads(threads);
   const auto arena = std::make_shared<tbb::task_arena>(threads);
   world.set_parallel_for([arena](Index n, const std::function<void(Index)>& work) {
     arena->execute([&] { tbb::parallel_for(Index(0), n, work); });

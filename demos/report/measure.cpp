@@ -22,8 +22,8 @@ using softbody::Precision;
 namespace {
 
 constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
-constexpr std::pair<Precision, const char*> kPrecisions[] = {{Precision::Float, "float"},
-                                                             {Precision::Double, "double"}};
+constexpr std::pair<Precision, const char*> kPrecisions[] = {
+    {Precision::Float, "float"}, {Precision::Double, "double"}, {Precision::DoubleFloat, "double-float"}};
 // Farther than this many sizes of the scene from where it should be, a run has blown up.
 constexpr double kBlownUp = 10;
 

@@ -313,15 +313,17 @@ Scene build(const SceneDescription& description, const Scene* reuse) { return Bu
 void override_solver(SceneDescription& description, const std::string& method, double dt,
                      const std::string& precision) {
   if (!method.empty()) method_of(method);
-  if (!precision.empty() && precision != "float" && precision != "double")
-    throw Error("there is no precision \"" + precision + "\"; there are float, double");
+  if (!precision.empty()) try {
+      softbody::precision_named(precision);
+    } catch (const std::invalid_argument& error) {
+      throw Error(error.what());
+    }
   for (SoftBody& body : description.bodies) {
+    if (!method.empty() || dt > 0 || !precision.empty()) body.solver.error = 0;
     if (!method.empty()) body.solver.method = method;
     if (dt > 0 || body.solver.method != softbody::filtered_leapfrog().name) body.solver.wanted_error = 0;
     if (dt > 0) body.solver.dt = dt;
-    if (!method.empty() || dt > 0 || !precision.empty()) body.solver.error = 0;
-    if (!precision.empty())
-      body.solver.precision = precision == "float" ? softbody::Precision::Float : softbody::Precision::Double;
+    if (!precision.empty()) body.solver.precision = softbody::precision_named(precision);
   }
 }
 

@@ -234,8 +234,7 @@ Solver read_solver(const Object& object) {
     solver.wanted_error = error->number(Range::positive(), "m");
   }
   if (const auto precision = object.find("precision"))
-    solver.precision =
-        precision->choice({"float", "double"}) == "float" ? softbody::Precision::Float : softbody::Precision::Double;
+    solver.precision = softbody::precision_named(precision->choice({"float", "double", "double-float"}));
   return solver;
 }
 

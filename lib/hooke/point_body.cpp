@@ -317,7 +317,9 @@ template <class S>
 MotionFacts PointBody<S>::motion_facts() const {
   const Work& work = integrator_.work();
   return {std::string(settings_.method->name),
-          std::is_same_v<S, float> ? "float" : "double",
+          std::string(fused()                    ? stepper_->precision()
+                      : std::is_same_v<S, float> ? "float"
+                                                 : "double"),
           substeps(),
           stable_step(),
           settings_.dt,

@@ -5,6 +5,7 @@
 #include <hooke/point_masses.hpp>
 
 #include <span>
+#include <string_view>
 
 namespace hooke {
 
@@ -28,6 +29,8 @@ class Stepper {
   virtual void run(std::span<const Stage> stages, Gang* gang) = 0;
   /// Writes positions and velocities back.
   virtual void store(PointMasses<S>& points) const = 0;
+  /// float, double or double-float: what the steps are made in.
+  virtual std::string_view precision() const = 0;
 };
 
 }  // namespace hooke

@@ -148,6 +148,53 @@ TYPED_TEST(Stepper, HasTheSameBitsWhereStagesFollowEachOther) {
   EXPECT_TRUE((one.position == two.position).all());
 }
 
+// Two floats are nearer to double than one, at the same steps.
+TEST(TwoFloats, LoseFarLessThanOne) {
+  SoftBodySettings settings = sheet(33, 20);
+  const auto end = [&](softbody::Precision precision) {
+    settings.precision = precision;
+    World world;
+    Body& body = world.add(softbody::make_soft_body(settings));
+    EXPECT_TRUE(world.update(0.1).good());
+    EXPECT_EQ(body.motion_facts().precision, softbody::precision_name(precision));
+    return body.positions();
+  };
+  const Points<double> exact = end(softbody::Precision::Double);
+  const double one = (end(softbody::Precision::Float) - exact).abs().maxCoeff();
+  const double two = (end(softbody::Precision::DoubleFloat) - exact).abs().maxCoeff();
+  EXPECT_GT(two, 0);
+  EXPECT_LT(two, one / 10) << one << " in one float";
+}
+
+// Increments far below a float's last place add up; what is left is the rounding of forces.
+TEST(TwoFloats, KeepTinySteps) {
+  SoftBodySettings settings = sheet(9, 9);
+  settings.positions.col(0) += 100;
+  settings.pins.clear();
+  settings.motion.dt = 1e-6;
+  settings.velocities = Points<double>::Constant(81, 3, 0.01);
+  const auto error = [&](softbody::Precision precision) {
+    settings.precision = precision;
+    World world;
+    world.enable_gravity(false);
+    Body& body = world.add(softbody::make_soft_body(settings));
+    EXPECT_TRUE(world.update(0.05).good());
+    return (body.positions() - settings.positions - 0.05 * 0.01).abs().maxCoeff();
+  };
+  EXPECT_LT(error(softbody::Precision::DoubleFloat), 1e-7);
+  EXPECT_GT(error(softbody::Precision::Float), 1e-4);
+}
+
+TEST(TwoFloats, SayWhatTheyTake) {
+  SoftBodySettings settings = sheet(9, 9);
+  settings.precision = softbody::Precision::DoubleFloat;
+  settings.motion.method = &rk4();
+  EXPECT_THROW(softbody::make_soft_body(settings), std::invalid_argument);
+  settings = sheet(9, 9, true);
+  settings.precision = softbody::Precision::DoubleFloat;
+  EXPECT_THROW(softbody::make_soft_body(settings), std::invalid_argument);
+}
+
 // Rest is bitwise rest: the kernel's forces at rest lengths are exactly zero.
 TYPED_TEST(Stepper, KeepsRest) {
   for (SoftBodySettings settings : {sheet(19, 13), sheet(19, 13, true), tangle(50, 200)}) {

@@ -31,14 +31,16 @@ struct alignas(64) GridBand {
 // What a stage keeps of the rows behind it.
 template <class S>
 struct GridWake {
-  S* ring;  // four rows of: old positions (3), then force per length of the springs down, diagonal, antidiagonal, down2
+  S* ring;  // four rows: old positions, then force per length of the springs down, diagonal, antidiagonal, down2
 };
 
 template <class S>
 struct GridState {
   Index rows, blocks;
-  std::ptrdiff_t stride;      // from coordinate to coordinate in a row, a block's margin on both sides
-  S *x, *motion;              // rows of x|y|z; rows of blocks of vx|vy|vz|1/m
+  std::ptrdiff_t stride;  // from coordinate to coordinate in a row, a block's margin on both sides
+  // Positions and velocities are x, y, z; in two floats also what they are more than that.
+  bool low;
+  S *x, *motion;              // rows of x|y|z(|low x|y|z); rows of blocks of vx|vy|vz|1/m(|low vx|vy|vz)
   const S* push;              // null, or rows of blocks of ax|ay|az
   const S* const* stiffness;  // by row: blocks of six directions
   const S* const* rest;       // by row: blocks of L in six directions, then L²
@@ -52,9 +54,13 @@ struct GridState {
   S* halo;  // by band: its first two rows as they were before the stage
 
   Index first(int b) const { return rows * b / bands; }
-  S* edge(int b, int row) const { return halo + (b * 2 + row) * 3 * stride + kColumns<S>; }
-  S* position(Index row) const { return x + row * 3 * stride + kColumns<S>; }
-  S* old(const GridWake<S>& wake, Index row) const { return wake.ring + ((row + 4) & 3) * 7 * stride + kColumns<S>; }
+  int planes() const { return low ? 6 : 3; }
+  int fields() const { return low ? 7 : 4; }
+  S* edge(int b, int row) const { return halo + (b * 2 + row) * planes() * stride + kColumns<S>; }
+  S* position(Index row) const { return x + row * planes() * stride + kColumns<S>; }
+  S* old(const GridWake<S>& wake, Index row) const {
+    return wake.ring + ((row + 4) & 3) * (planes() + 4) * stride + kColumns<S>;
+  }
 };
 
 }  // namespace hooke::softbody
@@ -93,23 +99,31 @@ HWY_INLINE V<S> shifted(V<S> now, V<S> before, [[maybe_unused]] V<S> older) {
 #endif
 }
 
+// (high, low) += more, where low stays below half a unit of high's last place (Knuth's two-sum).
+template <class S>
+HWY_INLINE void add_exactly(V<S>& high, V<S>& low, V<S> more) {
+  const auto y = hn::Add(low, more), sum = hn::Add(high, y), part = hn::Sub(sum, high);
+  low = hn::Add(hn::Sub(high, hn::Sub(sum, part)), hn::Sub(y, part));
+  high = sum;
+}
+
 // One stage on row r, with the two rows below it; without `stepped`, no more than its springs.
-template <bool pushed, bool stepped, class S>
+template <bool pushed, bool stepped, bool low, class S>
 void row(const GridState<S>& grid, const GridWake<S>& wake, Index r, const Stage& stage, const S* x1, const S* x2) {
   const Tag<S> d;
   constexpr int kLanes = int(hn::MaxLanes(d));
-  constexpr int kBlock = kColumns<S>;
+  constexpr int kBlock = kColumns<S>, kPlanes = low ? 6 : 3, kFields = low ? 7 : 4;
   const std::ptrdiff_t st = grid.stride;
   const auto kick = hn::Set(d, S(stage.kick)), drift = hn::Set(d, S(stage.drift));
   const auto gx = hn::Set(d, grid.gravity[0]), gy = hn::Set(d, grid.gravity[1]), gz = hn::Set(d, grid.gravity[2]);
   S* HWY_RESTRICT x0 = grid.position(r);
   S* HWY_RESTRICT o0 = grid.old(wake, r);
   const S *o1 = grid.old(wake, r - 1), *o2 = grid.old(wake, r - 2);
-  S* HWY_RESTRICT motion = grid.motion + r * grid.blocks * 4 * kBlock;
+  S* HWY_RESTRICT motion = grid.motion + r * grid.blocks * kFields * kBlock;
   const S* push = pushed ? grid.push + r * grid.blocks * 3 * kBlock : nullptr;
   const S *stiffness = grid.stiffness[r], *rest = grid.rest[r];
-  S* HWY_RESTRICT s0 = o0 + 3 * st;
-  const S *s1 = o1 + 3 * st, *s2 = o2 + 3 * st;
+  S* HWY_RESTRICT s0 = o0 + kPlanes * st;
+  const S *s1 = o1 + kPlanes * st, *s2 = o2 + kPlanes * st;
   // Pulls of the springs to the right, one and two columns long, of the vectors before.
   auto rx = hn::Zero(d), ry = rx, rz = rx, ux = rx, uy = rx, uz = rx;
   [[maybe_unused]] auto olderx = rx, oldery = rx, olderz = rx;
@@ -117,11 +131,16 @@ void row(const GridState<S>& grid, const GridWake<S>& wake, Index r, const Stage
     for (int lane = 0; lane < kBlock; lane += kLanes) {
       V<S> dx[6], dy[6], dz[6], l[6], s[6];
       const auto ax = hn::Load(d, x0), ay = hn::Load(d, x0 + st), az = hn::Load(d, x0 + 2 * st);
+      const auto difference = [&](int k, const S* to, V<S> a) HWY_ATTR {
+        const auto high = hn::Sub(hn::LoadU(d, to + k * st), a);
+        if constexpr (low)
+          return hn::Add(high, hn::Sub(hn::LoadU(d, to + (3 + k) * st), hn::Load(d, x0 + (3 + k) * st)));
+        else
+          return high;
+      };
       // Quotients wait for square roots: other work goes between.
       const auto root = [&](int i, const S* to) HWY_ATTR {
-        dx[i] = hn::Sub(hn::LoadU(d, to), ax);
-        dy[i] = hn::Sub(hn::LoadU(d, to + st), ay);
-        dz[i] = hn::Sub(hn::LoadU(d, to + 2 * st), az);
+        dx[i] = difference(0, to, ax), dy[i] = difference(1, to, ay), dz[i] = difference(2, to, az);
         const auto l2 = squared_length(d, dx[i], dy[i], dz[i]);
         const int at = i * kBlock + lane;
         s[i] = hn::Mul(hn::Load(d, stiffness + at), hn::Sub(l2, hn::Load(d, rest + 6 * kBlock + at)));
@@ -131,9 +150,9 @@ void row(const GridState<S>& grid, const GridWake<S>& wake, Index r, const Stage
       auto fx = hn::Zero(d), fy = fx, fz = fx;
       const auto pull = [&](const S* to, const S* scale) HWY_ATTR {
         const auto k = hn::LoadU(d, scale);
-        fx = hn::MulAdd(k, hn::Sub(hn::LoadU(d, to), ax), fx);
-        fy = hn::MulAdd(k, hn::Sub(hn::LoadU(d, to + st), ay), fy);
-        fz = hn::MulAdd(k, hn::Sub(hn::LoadU(d, to + 2 * st), az), fz);
+        fx = hn::MulAdd(k, difference(0, to, ax), fx);
+        fy = hn::MulAdd(k, difference(1, to, ay), fy);
+        fz = hn::MulAdd(k, difference(2, to, az), fz);
       };
       const auto own = [&](int i, S* keep) HWY_ATTR {
         hn::Store(s[i], d, keep);
@@ -162,6 +181,8 @@ void row(const GridState<S>& grid, const GridWake<S>& wake, Index r, const Stage
       quotient(kDiagonal), quotient(kAntidiagonal), quotient(kDown2);
       pull(o2, s2 + 3 * st);
       hn::Store(ax, d, o0), hn::Store(ay, d, o0 + st), hn::Store(az, d, o0 + 2 * st);
+      if constexpr (low)
+        for (int k = 3; k < 6; ++k) hn::Store(hn::Load(d, x0 + k * st), d, o0 + k * st);
       own(kDiagonal, s0 + st), own(kAntidiagonal, s0 + 2 * st), own(kDown2, s0 + 3 * st);
       if constexpr (stepped) {
         const auto w = hn::Load(d, motion + 3 * kBlock + lane);
@@ -169,16 +190,27 @@ void row(const GridState<S>& grid, const GridWake<S>& wake, Index r, const Stage
         const auto step = [&](int k, V<S> f, V<S> g, V<S> a) HWY_ATTR {
           auto more = hn::IfThenElseZero(free, g);
           if constexpr (pushed) more = hn::Add(more, hn::Load(d, push + k * kBlock + lane));
-          const auto v = hn::MulAdd(kick, hn::MulAdd(f, w, more), hn::Load(d, motion + k * kBlock + lane));
-          hn::Store(v, d, motion + k * kBlock + lane);
-          hn::Store(hn::MulAdd(drift, v, a), d, x0 + k * st);
+          S *v_at = motion + k * kBlock + lane, *x_at = x0 + k * st;
+          const auto acceleration = hn::MulAdd(f, w, more);
+          if constexpr (low) {
+            S *v_low_at = v_at + 4 * kBlock, *x_low_at = x_at + 3 * st;
+            auto v = hn::Load(d, v_at), v_low = hn::Load(d, v_low_at), x_low = hn::Load(d, x_low_at);
+            add_exactly<S>(v, v_low, hn::Mul(kick, acceleration));
+            add_exactly<S>(a, x_low, hn::MulAdd(drift, v, hn::Mul(drift, v_low)));
+            hn::Store(v, d, v_at), hn::Store(v_low, d, v_low_at);
+            hn::Store(a, d, x_at), hn::Store(x_low, d, x_low_at);
+          } else {
+            const auto v = hn::MulAdd(kick, acceleration, hn::Load(d, v_at));
+            hn::Store(v, d, v_at);
+            hn::Store(hn::MulAdd(drift, v, a), d, x_at);
+          }
         };
         step(0, fx, gx, ax), step(1, fy, gy, ay), step(2, fz, gz, az);
       }
       x0 += kLanes, x1 += kLanes, x2 += kLanes, o0 += kLanes, o1 += kLanes, o2 += kLanes;
       s0 += kLanes, s1 += kLanes, s2 += kLanes;
     }
-    motion += 4 * kBlock, stiffness += 6 * kBlock, rest += 12 * kBlock;
+    motion += kFields * kBlock, stiffness += 6 * kBlock, rest += 12 * kBlock;
     if constexpr (pushed) push += 3 * kBlock;
   }
 }
@@ -187,28 +219,43 @@ template <class S>
 void drift_row(const GridState<S>& grid, Index r, S drift) {
   const Tag<S> d;
   constexpr int kBlock = kColumns<S>;
-  const S* v = grid.motion + r * grid.blocks * 4 * kBlock;
+  const auto h = hn::Set(d, drift);
+  const S* motion = grid.motion + r * grid.blocks * grid.fields() * kBlock;
   S* x = grid.position(r);
-  for (Index block = 0; block < grid.blocks; ++block, v += 4 * kBlock, x += kBlock)
+  for (Index block = 0; block < grid.blocks; ++block, motion += grid.fields() * kBlock, x += kBlock)
     for (int k = 0; k < 3; ++k)
       for (int lane = 0; lane < kBlock; lane += int(hn::MaxLanes(d))) {
+        const S* v_at = motion + k * kBlock + lane;
         S* at = x + k * grid.stride + lane;
-        hn::Store(hn::MulAdd(hn::Set(d, drift), hn::Load(d, v + k * kBlock + lane), hn::Load(d, at)), d, at);
+        const auto v = hn::Load(d, v_at);
+        auto high = hn::Load(d, at);
+        if (grid.low) {
+          S* low_at = at + 3 * grid.stride;
+          auto low = hn::Load(d, low_at);
+          add_exactly<S>(high, low, hn::MulAdd(h, v, hn::Mul(h, hn::Load(d, v_at + 4 * kBlock))));
+          hn::Store(high, d, at), hn::Store(low, d, low_at);
+        } else {
+          hn::Store(hn::MulAdd(h, v, high), d, at);
+        }
       }
 }
 
 template <bool stepped, class S>
 void row(const GridState<S>& grid, const GridWake<S>& wake, Index r, const Stage& stage, const S* x1, const S* x2) {
-  if (stepped && grid.push)
-    row<true, stepped>(grid, wake, r, stage, x1, x2);
-  else
-    row<false, stepped>(grid, wake, r, stage, x1, x2);
+  const bool pushed = stepped && grid.push;
+  if constexpr (sizeof(S) == 4) {
+    if (grid.low)
+      return pushed ? row<true, stepped, true>(grid, wake, r, stage, x1, x2)
+                    : row<false, stepped, true>(grid, wake, r, stage, x1, x2);
+  }
+  return pushed ? row<true, stepped, false>(grid, wake, r, stage, x1, x2)
+                : row<false, stepped, false>(grid, wake, r, stage, x1, x2);
 }
 
 // Nothing is above the first row.
 template <class S>
 void begin_wake(const GridState<S>& grid, const GridWake<S>& wake) {
-  for (Index r = -2; r < 0; ++r) std::fill_n(grid.old(wake, r) - kColumns<S>, 7 * grid.stride, S(0));
+  for (Index r = -2; r < 0; ++r) std::fill_n(grid.old(wake, r) - kColumns<S>, (grid.planes() + 4) * grid.stride, S(0));
 }
 
 // A stage needs two rows ahead of the one it steps, so the next stage may follow three rows behind.
@@ -251,7 +298,7 @@ void run_band(const GridState<S>& grid, std::span<const Stage> stages, int b) {
     if (above) {
       wait_for(grid.band[b - 1].done, int(i));
       for (int k = 0; k < 2; ++k)
-        std::copy_n(grid.position(first + k) - kColumns<S>, 3 * grid.stride, grid.edge(b, k) - kColumns<S>);
+        std::copy_n(grid.position(first + k) - kColumns<S>, grid.planes() * grid.stride, grid.edge(b, k) - kColumns<S>);
       for (Index r = first - 2; r < first; ++r)
         row<false>(grid, wake, r, stage, grid.position(r + 1), grid.position(r + 2));
     } else {
@@ -302,15 +349,17 @@ constexpr std::size_t kTogether = 4;
 // Bands of fewer points do not pay for their edges.
 constexpr Index kBandPoints = 1500, kBandRows = 8;
 
-template <class S>
-class GridStepper final : public Stepper<S> {
+// O is the body's scalar, S the kernel's; where they differ, a value is held in two of the latter.
+template <class O, class S>
+class GridStepper final : public Stepper<O> {
  public:
-  GridStepper(const SpringNetwork& network, const SpringGrid& grid, const Points<S>& start) : columns_(grid.columns) {
+  GridStepper(const SpringNetwork& network, const SpringGrid& grid, const Points<O>& start) : columns_(grid.columns) {
+    state_.low = kLow;
     state_.rows = grid.rows;
     state_.blocks = (grid.columns + kBlock - 1) / kBlock;
     state_.stride = (state_.blocks + 2) * kBlock;
-    x_.resize(std::size_t((grid.rows + 2) * 3 * state_.stride));
-    motion_.resize(std::size_t(grid.rows * state_.blocks * 4 * kBlock));
+    x_.resize(std::size_t((grid.rows + 2) * state_.planes() * state_.stride));
+    motion_.resize(std::size_t(grid.rows * state_.blocks * state_.fields() * kBlock));
     state_.x = x_.data(), state_.motion = motion_.data();
     make_springs(network, grid, start);
     const std::size_t bytes = sizeof(S) * std::size_t(grid.rows * state_.blocks * kBlock) * 19;
@@ -318,17 +367,25 @@ class GridStepper final : public Stepper<S> {
     make_wakes(state_.together);
   }
 
-  void load(const PointMasses<S>& points, const Vec3& gravity, const Points<S>* push) override {
+  void load(const PointMasses<O>& points, const Vec3& gravity, const Points<O>* push) override {
     for (int k = 0; k < 3; ++k) state_.gravity[k] = S(gravity[k]);
     if (push && push_.empty()) push_.resize(std::size_t(state_.rows * state_.blocks * 3 * kBlock));
     state_.push = push ? push_.data() : nullptr;
-    for (Index r = 0; r < state_.rows; ++r)
+    const int fields = state_.fields();
+    for (Index r = 0; r < state_.rows; ++r) {
       for (int k = 0; k < 3; ++k) {
-        std::copy_n(&points.position(r * columns_, k), columns_, state_.position(r) + k * state_.stride);
-        to_blocks(&points.velocity(r * columns_, k), r, 4, k, state_.motion);
-        if (push) to_blocks(&(*push)(r * columns_, k), r, 3, k, push_.data());
+        const O *x = &points.position(r * columns_, k), *v = &points.velocity(r * columns_, k);
+        S* to = state_.position(r) + k * state_.stride;
+        std::transform(x, x + columns_, to, [](O value) { return S(value); });
+        to_blocks(v, r, fields, k, state_.motion, [](O value) { return S(value); });
+        if (push) to_blocks(&(*push)(r * columns_, k), r, 3, k, push_.data(), [](O value) { return S(value); });
+        if (!kLow) continue;
+        const auto low = [](O value) { return S(value - O(S(value))); };
+        std::transform(x, x + columns_, to + 3 * state_.stride, low);
+        to_blocks(v, r, fields, 4 + k, state_.motion, low);
       }
-    for (Index r = 0; r < state_.rows; ++r) to_blocks(&points.inverse_mass[r * columns_], r, 4, 3, state_.motion);
+      to_blocks(&points.inverse_mass[r * columns_], r, fields, 3, state_.motion, [](O value) { return S(value); });
+    }
   }
 
   void run(std::span<const Stage> stages, Gang* gang) override {
@@ -341,7 +398,7 @@ class GridStepper final : public Stepper<S> {
     if (std::size_t(state_.bands) > wakes_.size()) make_wakes(std::size_t(state_.bands));
     if (bands_.size() < std::size_t(state_.bands)) {
       bands_ = std::vector<GridBand>(std::size_t(state_.bands));
-      halo_.resize(std::size_t(state_.bands * 2 * 3 * state_.stride));
+      halo_.resize(std::size_t(state_.bands * 2 * state_.planes() * state_.stride));
     }
     state_.band = bands_.data(), state_.halo = halo_.data();
     for (GridBand& band : bands_) band.ready = 0, band.done = 0;
@@ -350,18 +407,31 @@ class GridStepper final : public Stepper<S> {
     });
   }
 
-  void store(PointMasses<S>& points) const override {
+  void store(PointMasses<O>& points) const override {
+    const int fields = state_.fields();
     for (Index r = 0; r < state_.rows; ++r)
       for (int k = 0; k < 3; ++k) {
-        std::copy_n(state_.position(r) + k * state_.stride, columns_, &points.position(r * columns_, k));
-        for (Index c = 0; c < columns_; c += kBlock)
-          std::copy_n(state_.motion + at(r, c, 4, k), std::min<Index>(kBlock, columns_ - c),
-                      &points.velocity(r * columns_ + c, k));
+        O *x = &points.position(r * columns_, k), *v = &points.velocity(r * columns_, k);
+        const S* from = state_.position(r) + k * state_.stride;
+        for (Index c = 0; c < columns_; c += kBlock) {
+          const Index n = std::min<Index>(kBlock, columns_ - c);
+          const S *high = from + c, *low = high + 3 * state_.stride;
+          const S *v_high = state_.motion + at(r, c, fields, k), *v_low = v_high + 4 * kBlock;
+          for (Index i = 0; i < n; ++i) {
+            x[c + i] = kLow ? O(high[i]) + O(low[i]) : O(high[i]);
+            v[c + i] = kLow ? O(v_high[i]) + O(v_low[i]) : O(v_high[i]);
+          }
+        }
       }
+  }
+
+  std::string_view precision() const override {
+    return kLow ? "double-float" : std::is_same_v<O, float> ? "float" : "double";
   }
 
  private:
   static constexpr int kBlock = kColumns<S>;
+  static constexpr bool kLow = !std::is_same_v<O, S>;
 
   void run_one(std::span<const Stage> stages, int b) {
     if constexpr (std::is_same_v<S, float>)
@@ -372,8 +442,9 @@ class GridStepper final : public Stepper<S> {
 
   void make_wakes(std::size_t n) {
     wakes_.resize(n);
-    rings_.resize(n * std::size_t(4 * 7 * state_.stride));
-    for (std::size_t i = 0; i < n; ++i) wakes_[i].ring = rings_.data() + std::ptrdiff_t(i) * 4 * 7 * state_.stride;
+    const std::ptrdiff_t ring = 4 * (state_.planes() + 4) * state_.stride;
+    rings_.resize(n * std::size_t(ring));
+    for (std::size_t i = 0; i < n; ++i) wakes_[i].ring = rings_.data() + std::ptrdiff_t(i) * ring;
     state_.wakes = wakes_;
   }
 
@@ -382,13 +453,20 @@ class GridStepper final : public Stepper<S> {
     return ((r * state_.blocks + c / kBlock) * fields + field) * kBlock + c % kBlock;
   }
 
-  void to_blocks(const S* from, Index r, int fields, int field, S* to) const {
+  template <class Convert>
+  void to_blocks(const O* from, Index r, int fields, int field, S* to, Convert convert) const {
     for (Index c = 0; c < columns_; c += kBlock)
-      std::copy_n(from + c, std::min<Index>(kBlock, columns_ - c), to + at(r, c, fields, field));
+      std::transform(from + c, from + std::min(c + kBlock, columns_), to + at(r, c, fields, field), convert);
+  }
+
+  // As the kernel takes it.
+  static S difference_of(O a, O b) {
+    const S high = S(b) - S(a);
+    return kLow ? high + (S(b - O(S(b))) - S(a - O(S(a)))) : high;
   }
 
   // Rows of parameters, each different one kept once.
-  void make_springs(const SpringNetwork& network, const SpringGrid& grid, const Points<S>& start) {
+  void make_springs(const SpringNetwork& network, const SpringGrid& grid, const Points<O>& start) {
     const Index width = state_.blocks * kBlock;
     std::vector<S> difference(std::size_t(3 * width)), square(static_cast<std::size_t>(width));
     std::map<std::vector<S>, std::vector<Index>> stiffness_rows, rest_rows;
@@ -406,7 +484,7 @@ class GridStepper final : public Stepper<S> {
           stiffness[std::size_t(at(0, c, 6, direction))] = S(spring.stiffness);
           for (int k = 0; k < 3; ++k)
             difference[std::size_t(k * width + c)] = spring.rest_length == Spring::kFromStart
-                                                         ? start(spring.b, k) - start(spring.a, k)
+                                                         ? difference_of(start(spring.a, k), start(spring.b, k))
                                                          : S(k == 0 ? spring.rest_length : 0);
         }
         if constexpr (std::is_same_v<S, float>)
@@ -449,7 +527,12 @@ class GridStepper final : public Stepper<S> {
 template <class S>
 std::unique_ptr<Stepper<S>> make_grid_stepper(const SpringNetwork& network, const SpringGrid& grid,
                                               const Points<S>& start) {
-  return std::make_unique<GridStepper<S>>(network, grid, start);
+  return std::make_unique<GridStepper<S, S>>(network, grid, start);
+}
+
+std::unique_ptr<Stepper<double>> make_two_float_grid_stepper(const SpringNetwork& network, const SpringGrid& grid,
+                                                             const Points<double>& start) {
+  return std::make_unique<GridStepper<double, float>>(network, grid, start);
 }
 
 template std::unique_ptr<Stepper<float>> make_grid_stepper(const SpringNetwork&, const SpringGrid&,

@@ -20,10 +20,14 @@ namespace hooke::softbody {
 /// Where the grid outgrows the caches, several stages follow each other down the rows at once.
 ///
 /// Cost: 0.7 ns a spring and stage in float with AVX2, 1.7 ns in double.
-/// @param rest rest lengths [m] by spring; where a spring's length is that of the start, its square is taken
-///        from `start`, (n, 3)
+/// @param start positions (n, 3) that resolve missing rest lengths
 template <class S>
 std::unique_ptr<Stepper<S>> make_grid_stepper(const SpringNetwork& network, const SpringGrid& grid,
                                               const Points<S>& start);
+
+/// The same for positions and velocities in two floats each: forces to float's precision of differences that
+/// are more precise, sums that lose nothing. Error between float's and double's, at 1.5 × float's cost.
+std::unique_ptr<Stepper<double>> make_two_float_grid_stepper(const SpringNetwork& network, const SpringGrid& grid,
+                                                             const Points<double>& start);
 
 }  // namespace hooke::softbody

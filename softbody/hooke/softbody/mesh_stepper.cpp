@@ -282,6 +282,8 @@ class MeshStepper final : public Stepper<S> {
       }
   }
 
+  std::string_view precision() const override { return std::is_same_v<S, float> ? "float" : "double"; }
+
  private:
   static constexpr std::size_t kWidth = std::size_t(kGroup<S>);
 

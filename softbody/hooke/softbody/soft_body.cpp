@@ -29,14 +29,31 @@ std::unique_ptr<Body> make(const SoftBodySettings& s) {
                        : std::make_unique<PointBody<S>>(s.name, std::move(points), s.motion);
   for (const Index pin : s.pins) body->pin(pin);
   if (!filtered && s.network && !s.network->springs.empty())
-    body->add_field(std::make_unique<SpringField<S>>(s.network, body->state().position));
+    body->add_field(
+        std::make_unique<SpringField<S>>(s.network, body->state().position, s.precision == Precision::DoubleFloat));
   if (s.wind) body->add_field(std::make_unique<WindField<S>>(*s.wind, s.triangles, n));
   if (s.linear_drag != 0) body->add_field(std::make_unique<LinearDrag<S>>(s.linear_drag));
   if (s.quadratic_drag != 0) body->add_field(std::make_unique<QuadraticDrag<S>>(s.quadratic_drag));
+  if (s.precision == Precision::DoubleFloat && !body->fused())
+    throw std::invalid_argument("body \"" + s.name +
+                                "\": double-float takes undamped springs of a grid alone, and a splitting method; got "
+                                "method " +
+                                std::string(s.motion.method->name) + ". Take double");
   return body;
 }
 
 }  // namespace
+
+Precision precision_named(std::string_view name) {
+  for (const Precision precision : {Precision::Float, Precision::Double, Precision::DoubleFloat})
+    if (precision_name(precision) == name) return precision;
+  throw std::invalid_argument("no precision is called \"" + std::string(name) +
+                              "\"; there are float, double, double-float");
+}
+
+std::string_view precision_name(Precision precision) {
+  return precision == Precision::Float ? "float" : precision == Precision::Double ? "double" : "double-float";
+}
 
 SoftBodySettings settings_of(const Cloth& cloth) {
   SoftBodySettings settings;

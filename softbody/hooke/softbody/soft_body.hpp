@@ -7,10 +7,19 @@
 #include <hooke/softbody/wind.hpp>
 
 #include <optional>
+#include <string_view>
 
 namespace hooke::softbody {
 
-enum class Precision { Float, Double };
+/// In double-float, positions and velocities are held in two floats each: on undamped springs of a grid,
+/// by splitting methods, at 1.5 × float's cost. The body's own numbers are double then; ticks with
+/// contacts or driven pins are computed in double.
+enum class Precision { Float, Double, DoubleFloat };
+
+/// The precision of that name: float, double, double-float.
+/// @throws std::invalid_argument that lists them
+Precision precision_named(std::string_view name);
+std::string_view precision_name(Precision precision);
 
 /// Everything a soft body is made from. Positions are relative to `origin`.
 struct SoftBodySettings {

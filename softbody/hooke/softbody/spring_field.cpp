@@ -44,8 +44,8 @@ S across(const Unit<S>& unit, S rest) {
 }  // namespace
 
 template <class S>
-SpringField<S>::SpringField(std::shared_ptr<const SpringNetwork> network, const Points<S>& start)
-    : network_(std::move(network)), start_(start) {
+SpringField<S>::SpringField(std::shared_ptr<const SpringNetwork> network, const Points<S>& start, bool two_floats)
+    : network_(std::move(network)), start_(start), two_floats_(two_floats) {
   network_->check(start.rows());
   const auto& springs = network_->springs;
   std::vector<std::size_t> order(springs.size());
@@ -249,9 +249,13 @@ std::unique_ptr<Stepper<S>> SpringField<S>::stepper() const {
   if (damped_) return nullptr;
 #if HOOKE_HAS_HIGHWAY
   try {
-    return make_grid_stepper(*network_, SpringGrid::of(*network_, start_.rows()), start_);
+    const SpringGrid grid = SpringGrid::of(*network_, start_.rows());
+    if constexpr (std::is_same_v<S, double>)
+      if (two_floats_) return make_two_float_grid_stepper(*network_, grid, start_);
+    return make_grid_stepper(*network_, grid, start_);
   } catch (const std::invalid_argument&) {
-    return make_mesh_stepper(*network_, start_);  // not a grid
+    // Not a grid.
+    return two_floats_ ? nullptr : make_mesh_stepper(*network_, start_);
   }
 #else
   return nullptr;

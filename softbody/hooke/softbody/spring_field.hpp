@@ -18,7 +18,8 @@ class SpringField final : public ForceField<S> {
  public:
   /// @param start positions (n, 3) that resolve missing rest lengths
   /// @throws std::invalid_argument as SpringNetwork::check
-  SpringField(std::shared_ptr<const SpringNetwork> network, const Points<S>& start);
+  /// @param two_floats make steppers that hold a double in two floats; on grids only
+  SpringField(std::shared_ptr<const SpringNetwork> network, const Points<S>& start, bool two_floats = false);
 
   bool uses_velocity() const override { return damped_; }
   void add_force(const Points<S>& x, const Points<S>& v, double t, Points<S>& f) const override;
@@ -44,7 +45,7 @@ class SpringField final : public ForceField<S> {
 
   std::shared_ptr<const SpringNetwork> network_;
   Points<S> start_;
-  bool damped_ = false;
+  bool damped_ = false, two_floats_ = false;
   std::vector<Run> runs_;
   Index loose_ = 0;  // springs from here on are in no run
   std::vector<int> a_, b_;
