@@ -41,7 +41,7 @@ class PointBody : public Body, protected Dynamics<S> {
 
   /// True where a stepper of its only field moves it: a splitting method, forces of position alone. Ticks with
   /// contacts or driven pins still take the general way.
-  bool fused() const {
+  virtual bool fused() const {
     return stepper_ && !uses_velocity_ && std::holds_alternative<Splitting>(settings_.method->scheme);
   }
 

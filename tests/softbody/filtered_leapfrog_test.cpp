@@ -351,6 +351,19 @@ TYPED_TEST(Filtered, RestsOnASphere) {
   EXPECT_GT(run.body->positions().col(1).maxCoeff(), 0.28);
 }
 
+TYPED_TEST(Filtered, KeepsTheFilterWhereSpringsAreAdded) {
+  using S = TypeParam;
+  SoftBodySettings settings = filtered(sheet(24), 5e-3);
+  settings.precision = kPrecision<S>;
+  Play alone(settings), more(settings);
+  auto& body = dynamic_cast<PointBody<S>&>(*more.body);
+  const SoftBodySettings faint = sheet(24, 1e-9);
+  body.add_field(std::make_unique<SpringField<S>>(faint.network, body.state().position));
+  alone.ticks(10, 1e-2), more.ticks(10, 1e-2);
+  EXPECT_LT(rms(more.body->positions(), alone.body->positions()), 1e-6);
+  EXPECT_GT(rms(more.body->positions(), settings.positions), 1e-2);
+}
+
 TEST(FilteredLeapfrog, TellsWhatAWantedErrorChanges) {
   SoftBodySettings settings = filtered(sheet(64, 1000), 0);
   settings.wanted_error = 1e-2;

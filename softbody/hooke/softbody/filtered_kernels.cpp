@@ -1,10 +1,12 @@
-// Plain loops that the compiler turns into vector code, one clone an instruction set. Only
-// IEEE operations on one lane and no contraction: every clone gives the same bits.
+// Loops that the compiler turns into vector code, and vectors of 32 bytes, one clone an instruction set. Only
+// IEEE operations on one lane, contracted where there is multiply-add: all instruction sets that have it give
+// the same bits, and so do those that have not.
 #include <hooke/softbody/filtered_kernels.hpp>
 
 #include <cmath>
 #include <cstring>
 #include <initializer_list>
+#include <type_traits>
 
 // Sanitizers run before the dispatcher is resolved and crash in it.
 #if defined(__x86_64__) && defined(__GNUC__) && !defined(__clang__) && !defined(__SANITIZE_ADDRESS__) && \
@@ -15,200 +17,49 @@
 #endif
 #if defined(__clang__)
 #define HOOKE_INDEPENDENT _Pragma("clang loop vectorize(assume_safety)")
+#define HOOKE_UNROLL _Pragma("clang loop unroll(full)")
 #else
 #define HOOKE_INDEPENDENT _Pragma("GCC ivdep")
+#define HOOKE_UNROLL _Pragma("GCC unroll 8")
 #endif
+// One multiply-add after the other, wherever it is written.
+#define HOOKE_SQUARE(x, y, z) ((z) * (z) + ((y) * (y) + ((x) * (x) + kTiny<S>)))
 #define HOOKE_INLINE static inline __attribute__((always_inline))
 
 namespace hooke::softbody {
 
 namespace {
 
-// Below this length a spring has no direction.
 template <class S>
-constexpr S kTiny = S(1e-12);
-
-template <class S>
-struct Parameters {
-  const S *k, *rest, *rest2, *c;
-};
-
-template <class S>
-HOOKE_INLINE Parameters<S> parameters(const SheetRow<S>& row, int direction) {
-  const S* first = row.spring[direction];
-  return {first, first + row.stride, first + 2 * row.stride, first + 3 * row.stride};
-}
-
-// Force along d over d: k (l² - L²) / (l (l + L)), which is zero at rest, and c u·d / l².
-template <class S, bool damped>
-HOOKE_INLINE S pull(const Parameters<S>& p, int i, S dx, S dy, S dz, S ux, S uy, S uz) {
-  const S l2 = dx * dx + dy * dy + dz * dz;
-  const S root = std::sqrt(l2);
-  const S l = root > kTiny<S> ? root : kTiny<S>;
-  const S sum = l + p.rest[i];
-  if constexpr (damped) {
-    const S closing = ux * dx + uy * dy + uz * dz;
-    return (p.k[i] * (l2 - p.rest2[i]) * l + p.c[i] * closing * sum) / (l * l * sum);
-  } else {
-    return p.k[i] * (l2 - p.rest2[i]) / (l * sum);
+HOOKE_INLINE void square(int n, const S* d, S* out) {
+  for (int i = 0; i < n; ++i) {
+    const S x = d[i], y = d[n + i], z = d[2 * n + i];
+    out[i] = HOOKE_SQUARE(x, y, z);
   }
 }
 
-// Springs within the row. Their far ends lie one and two columns on, so they wait in scratch.
-template <class S, bool damped>
-HOOKE_INLINE void right_springs(SheetRow<S>& row) {
+template <class S>
+HOOKE_INLINE void move(const SheetMove<S>& row) {
   const int n = row.columns;
-  const std::ptrdiff_t m = n + 2;
-  const S *x = row.x[0][0], *y = row.x[0][1], *z = row.x[0][2];
-  const S *u = row.v[0][0], *v = row.v[0][1], *w = row.v[0][2];
-  const Parameters<S> one = parameters(row, 0), two = parameters(row, 1);
-  S *fx = row.f[0][0], *fy = row.f[0][1], *fz = row.f[0][2];
-  S *sx = row.scratch, *sy = sx + m, *sz = sy + m;
-  for (S* s : {sx, sy, sz}) s[0] = 0;
-  HOOKE_INDEPENDENT
-  for (int i = 0; i < n; ++i) {
-    const S dx = x[i + 1] - x[i], dy = y[i + 1] - y[i], dz = z[i + 1] - z[i];
-    const S p = damped ? pull<S, damped>(one, i, dx, dy, dz, u[i + 1] - u[i], v[i + 1] - v[i], w[i + 1] - w[i])
-                       : pull<S, damped>(one, i, dx, dy, dz, 0, 0, 0);
-    sx[i + 1] = p * dx, sy[i + 1] = p * dy, sz[i + 1] = p * dz;
-  }
-  HOOKE_INDEPENDENT
-  for (int i = 0; i < n; ++i) fx[i] += sx[i + 1] - sx[i], fy[i] += sy[i + 1] - sy[i], fz[i] += sz[i + 1] - sz[i];
-  for (S* s : {sx, sy, sz}) s[0] = s[1] = 0;
-  HOOKE_INDEPENDENT
-  for (int i = 0; i < n; ++i) {
-    const S dx = x[i + 2] - x[i], dy = y[i + 2] - y[i], dz = z[i + 2] - z[i];
-    const S p = damped ? pull<S, damped>(two, i, dx, dy, dz, u[i + 2] - u[i], v[i + 2] - v[i], w[i + 2] - w[i])
-                       : pull<S, damped>(two, i, dx, dy, dz, 0, 0, 0);
-    sx[i + 2] = p * dx, sy[i + 2] = p * dy, sz[i + 2] = p * dz;
-  }
-  HOOKE_INDEPENDENT
-  for (int i = 0; i < n; ++i) fx[i] += sx[i + 2] - sx[i], fy[i] += sy[i + 2] - sy[i], fz[i] += sz[i + 2] - sz[i];
-}
-
-// Springs to the same column `rows` below.
-template <class S, bool damped, bool set>
-HOOKE_INLINE void down_springs(SheetRow<S>& row, int direction, int rows) {
-  const S *ax = row.x[0][0], *ay = row.x[0][1], *az = row.x[0][2];
-  const S *bx = row.x[rows][0], *by = row.x[rows][1], *bz = row.x[rows][2];
-  const S *au = row.v[0][0], *av = row.v[0][1], *aw = row.v[0][2];
-  const S *bu = row.v[rows][0], *bv = row.v[rows][1], *bw = row.v[rows][2];
-  const Parameters<S> spring = parameters(row, direction);
-  S *fx = row.f[0][0], *fy = row.f[0][1], *fz = row.f[0][2];
-  S *gx = row.f[rows][0], *gy = row.f[rows][1], *gz = row.f[rows][2];
-  const int n = row.columns;
-  HOOKE_INDEPENDENT
-  for (int i = 0; i < n; ++i) {
-    const S dx = bx[i] - ax[i], dy = by[i] - ay[i], dz = bz[i] - az[i];
-    const S p = damped ? pull<S, damped>(spring, i, dx, dy, dz, bu[i] - au[i], bv[i] - av[i], bw[i] - aw[i])
-                       : pull<S, damped>(spring, i, dx, dy, dz, 0, 0, 0);
-    fx[i] += p * dx, fy[i] += p * dy, fz[i] += p * dz;
-    if constexpr (set)
-      gx[i] = -p * dx, gy[i] = -p * dy, gz[i] = -p * dz;
-    else
-      gx[i] -= p * dx, gy[i] -= p * dy, gz[i] -= p * dz;
-  }
-}
-
-// Both diagonals of each cell. What they do to the column on the right waits in scratch.
-template <class S, bool damped>
-HOOKE_INLINE void diagonal_springs(SheetRow<S>& row) {
-  const int n = row.columns;
-  const std::ptrdiff_t m = n + 2;
-  const S *ax = row.x[0][0], *ay = row.x[0][1], *az = row.x[0][2];
-  const S *bx = row.x[1][0], *by = row.x[1][1], *bz = row.x[1][2];
-  const S *au = row.v[0][0], *av = row.v[0][1], *aw = row.v[0][2];
-  const S *bu = row.v[1][0], *bv = row.v[1][1], *bw = row.v[1][2];
-  const Parameters<S> fall = parameters(row, 3), rise = parameters(row, 4);
-  S *fx = row.f[0][0], *fy = row.f[0][1], *fz = row.f[0][2];
-  S *gx = row.f[1][0], *gy = row.f[1][1], *gz = row.f[1][2];
-  S *sx = row.scratch, *sy = sx + m, *sz = sy + m;
-  for (S* s : {sx, sy, sz}) s[0] = 0;
-  HOOKE_INDEPENDENT
-  for (int i = 0; i < n; ++i) {
-    const S dx = bx[i + 1] - ax[i], dy = by[i + 1] - ay[i], dz = bz[i + 1] - az[i];
-    const S p = damped ? pull<S, damped>(fall, i, dx, dy, dz, bu[i + 1] - au[i], bv[i + 1] - av[i], bw[i + 1] - aw[i])
-                       : pull<S, damped>(fall, i, dx, dy, dz, 0, 0, 0);
-    fx[i] += p * dx, fy[i] += p * dy, fz[i] += p * dz;
-    sx[i + 1] = p * dx, sy[i + 1] = p * dy, sz[i + 1] = p * dz;
-  }
-  HOOKE_INDEPENDENT
-  for (int i = 0; i < n; ++i) gx[i] -= sx[i], gy[i] -= sy[i], gz[i] -= sz[i];
-  HOOKE_INDEPENDENT
-  for (int i = 0; i < n; ++i) {
-    const S dx = bx[i] - ax[i + 1], dy = by[i] - ay[i + 1], dz = bz[i] - az[i + 1];
-    const S p = damped ? pull<S, damped>(rise, i, dx, dy, dz, bu[i] - au[i + 1], bv[i] - av[i + 1], bw[i] - aw[i + 1])
-                       : pull<S, damped>(rise, i, dx, dy, dz, 0, 0, 0);
-    gx[i] -= p * dx, gy[i] -= p * dy, gz[i] -= p * dz;
-    sx[i + 1] = p * dx, sy[i + 1] = p * dy, sz[i + 1] = p * dz;
-  }
-  HOOKE_INDEPENDENT
-  for (int i = 0; i < n; ++i) fx[i] += sx[i], fy[i] += sy[i], fz[i] += sz[i];
-}
-
-template <class S, bool damped>
-HOOKE_INLINE void springs(SheetRow<S>& row) {
-  right_springs<S, damped>(row);
-  if (row.rows_below > 0) {
-    down_springs<S, damped, false>(row, 2, 1);
-    diagonal_springs<S, damped>(row);
-  }
-  if (row.rows_below > 1) down_springs<S, damped, true>(row, 5, 2);
-}
-
-template <class S>
-HOOKE_INLINE void all_springs(SheetRow<S>& row) {
-  if (row.v[0][0])
-    springs<S, true>(row);
-  else
-    springs<S, false>(row);
-}
-
-template <class S>
-HOOKE_INLINE void right_side(SheetRight<S>& row) {
-  const int n = row.columns;
-  const S* mass = row.mass;
+  const S kick = row.kick, h = row.h;
   for (int k = 0; k < 3; ++k) {
-    S* f = row.f[k];
-    const S* extra = row.extra[k];
-    const S scale = row.scale, gravity = row.gravity[k];
-    if (extra) {
+    S *x = row.x[k], *v = row.v[k], *predicted = row.predicted[k];
+    const S* z = row.z[k];
+    if (h != 0) {
       HOOKE_INDEPENDENT
-      for (int i = 0; i < n; ++i) f[i] = scale * f[i] + mass[i] * extra[i];
+      for (int i = 0; i < n; ++i) {
+        const S speed = v[i] + kick * z[i];
+        v[i] = speed;
+        x[i] += h * speed;
+      }
     } else {
       HOOKE_INDEPENDENT
-      for (int i = 0; i < n; ++i) f[i] = scale * f[i] + mass[i] * gravity;
+      for (int i = 0; i < n; ++i) v[i] += kick * z[i];
     }
-  }
-}
-
-template <class S>
-HOOKE_INLINE void sweep(SheetSweep<S>& row) {
-  const int n = row.columns;
-  const S pivot = row.pivot, w1 = row.w1, w2 = row.w2;
-  for (int k = 0; k < 3; ++k) {
-    S* y = row.y + k * row.plane;
-    const S *y1 = row.y1 + k * row.plane, *y2 = row.y2 + k * row.plane;
+    if (!predicted) continue;
     HOOKE_INDEPENDENT
-    for (int i = 0; i < n; ++i) y[i] = pivot * y[i] - w1 * y1[i] - w2 * y2[i];
+    for (int i = 0; i < n; ++i) predicted[i] = v[i] + S(0.5) * z[i];
   }
-}
-
-template <class S>
-HOOKE_INLINE void move(SheetMove<S>& row) {
-  const int n = row.columns;
-  S *x = row.x, *v = row.v, *predicted = row.predicted;
-  const S* z = row.z;
-  const S kick = row.kick, h = row.h;
-  HOOKE_INDEPENDENT
-  for (int i = 0; i < n; ++i) {
-    const S speed = v[i] + kick * z[i];
-    v[i] = speed;
-    x[i] += h * speed;
-  }
-  if (!predicted) return;
-  HOOKE_INDEPENDENT
-  for (int i = 0; i < n; ++i) predicted[i] = v[i] + S(0.5) * z[i];
 }
 
 template <class S>
@@ -245,19 +96,23 @@ HOOKE_INLINE void store(const V& v, S* to) {
 
 HOOKE_INLINE void transpose(Pack<float>::Type (&r)[8]) {
   Pack<float>::Type t[8];
+  HOOKE_UNROLL
   for (int i = 0; i < 8; i += 2) {
     t[i] = __builtin_shufflevector(r[i], r[i + 1], 0, 8, 1, 9, 4, 12, 5, 13);
     t[i + 1] = __builtin_shufflevector(r[i], r[i + 1], 2, 10, 3, 11, 6, 14, 7, 15);
   }
-  for (int i = 0; i < 8; i += 4)
-    for (int j = 0; j < 2; ++j) {
-      r[i + 2 * j] = __builtin_shufflevector(t[i + j], t[i + 2 + j], 0, 1, 8, 9, 4, 5, 12, 13);
-      r[i + 2 * j + 1] = __builtin_shufflevector(t[i + j], t[i + 2 + j], 2, 3, 10, 11, 6, 7, 14, 15);
-    }
+  HOOKE_UNROLL
+  for (int i = 0; i < 8; i += 4) HOOKE_UNROLL
+  for (int j = 0; j < 2; ++j) {
+    r[i + 2 * j] = __builtin_shufflevector(t[i + j], t[i + 2 + j], 0, 1, 8, 9, 4, 5, 12, 13);
+    r[i + 2 * j + 1] = __builtin_shufflevector(t[i + j], t[i + 2 + j], 2, 3, 10, 11, 6, 7, 14, 15);
+  }
+  HOOKE_UNROLL
   for (int i = 0; i < 4; ++i) {
     t[i] = __builtin_shufflevector(r[i], r[i + 4], 0, 1, 2, 3, 8, 9, 10, 11);
     t[i + 4] = __builtin_shufflevector(r[i], r[i + 4], 4, 5, 6, 7, 12, 13, 14, 15);
   }
+  HOOKE_UNROLL
   for (int i = 0; i < 8; ++i) r[i] = t[i];
 }
 
@@ -268,60 +123,228 @@ HOOKE_INLINE void transpose(Pack<double>::Type (&r)[4]) {
   r[2] = __builtin_shufflevector(a, c, 2, 3, 6, 7), r[3] = __builtin_shufflevector(b, d, 2, 3, 6, 7);
 }
 
-// A lane a row: tiles are turned on the way in and out, so that the recurrences run over vectors.
+template <class V>
+HOOKE_INLINE void take_roots(V& v) {
+  constexpr int n = int(sizeof v / sizeof v[0]);
+  alignas(V) std::remove_reference_t<decltype(v[0])> lanes[n];
+  std::memcpy(lanes, &v, sizeof v);
+  for (int i = 0; i < n; ++i) lanes[i] = std::sqrt(lanes[i]);
+  std::memcpy(&v, lanes, sizeof v);
+}
+
+// Lane i becomes element i - 1, or i - 2, of the sequence before, now.
+HOOKE_INLINE void shift(Pack<float>::Type& out, const Pack<float>::Type& before, const Pack<float>::Type& now, int by) {
+  if (by == 1)
+    out = __builtin_shufflevector(before, now, 7, 8, 9, 10, 11, 12, 13, 14);
+  else
+    out = __builtin_shufflevector(before, now, 6, 7, 8, 9, 10, 11, 12, 13);
+}
+HOOKE_INLINE void shift(Pack<double>::Type& out, const Pack<double>::Type& before, const Pack<double>::Type& now,
+                        int by) {
+  if (by == 1)
+    out = __builtin_shufflevector(before, now, 3, 4, 5, 6);
+  else
+    out = __builtin_shufflevector(before, now, 2, 3, 4, 5);
+}
+
+template <class V>
+struct Triple {
+  V x, y, z;
+};
+
+// Three coordinates that lie `apart` values from each other.
+template <class V, class S>
+HOOKE_INLINE void load(Triple<V>& t, const S* from, std::ptrdiff_t apart) {
+  load(t.x, from), load(t.y, from + apart), load(t.z, from + 2 * apart);
+}
+
+template <class V>
+HOOKE_INLINE void add_shifted(V& sum, const V& now, V& before, int by) {
+  V from;
+  shift(from, before, now, by);
+  sum += now - from;
+  before = now;
+}
+
+// A spring is worked on with the row it starts in; its force over its length waits for the rows it
+// ends in. Force over length: k (l² - L²) / (l² + l L), which is zero at rest, and c u·d / l².
+// Square roots and quotients take long: other work goes between them.
+template <class S, bool damped, bool extra>
+HOOKE_INLINE void forward(const SheetForward<S>& given) {
+  const SheetForward<S> row = given;  // a copy that no store can change
+  using V = typename Pack<S>::Type;
+  constexpr int n = kLanes<S>;
+  const std::ptrdiff_t pad = row.pad, plane = row.plane;
+  const S *x0 = row.x[0], *x1 = row.x[1], *x2 = row.x[2], *o1 = row.above, *o2 = row.above2;
+  const S *v0 = row.v[0], *v1 = row.v[1], *v2 = row.v[2];
+  S* p0 = row.pull;
+  const S *p1 = row.pull1, *p2 = row.pull2;
+  const S *stiffness = row.stiffness, *rest = row.rest, *damping = row.damping;
+  const V nothing = {};
+  Triple<V> right = {nothing, nothing, nothing}, right2 = right;
+  for (int first = 0; first < row.columns; first += n) {
+    Triple<V> a, d[6], force = {nothing, nothing, nothing};
+    [[maybe_unused]] Triple<V> u;
+    V over[6], under[6];
+    load(a, x0, pad);
+    if constexpr (damped) load(u, v0, pad);
+#define HOOKE_ROOT(i, to, to_v)                                                                \
+  {                                                                                            \
+    load(d[i], to, pad);                                                                       \
+    d[i].x -= a.x, d[i].y -= a.y, d[i].z -= a.z;                                               \
+    const V l2 = HOOKE_SQUARE(d[i].x, d[i].y, d[i].z);                                         \
+    V k, length, length2, l = l2;                                                              \
+    take_roots(l);                                                                             \
+    load(k, stiffness + i * n), load(length, rest + i * n), load(length2, rest + (6 + i) * n); \
+    over[i] = k * (l2 - length2);                                                              \
+    under[i] = l2 + l * length;                                                                \
+    if constexpr (damped) {                                                                    \
+      Triple<V> w;                                                                             \
+      V c;                                                                                     \
+      load(w, to_v, pad), load(c, damping + i * n);                                            \
+      const V closing = (w.x - u.x) * d[i].x + (w.y - u.y) * d[i].y + (w.z - u.z) * d[i].z;    \
+      over[i] = over[i] * l + c * closing * (l + length), under[i] *= l;                       \
+    }                                                                                          \
+  }
+#define HOOKE_PULL(from, scale)                                                            \
+  {                                                                                        \
+    Triple<V> to;                                                                          \
+    V s;                                                                                   \
+    load(to, from, pad), load(s, scale);                                                   \
+    force.x += s * (to.x - a.x), force.y += s * (to.y - a.y), force.z += s * (to.z - a.z); \
+  }
+#define HOOKE_OWN(i, keep) \
+  store(over[i], keep);    \
+  force.x += over[i] * d[i].x, force.y += over[i] * d[i].y, force.z += over[i] * d[i].z;
+    HOOKE_ROOT(kRight, x0 + 1, v0 + 1)
+    HOOKE_ROOT(kRight2, x0 + 2, v0 + 2)
+    HOOKE_ROOT(kDown, x1, v1)
+    HOOKE_PULL(o1, p1)
+    for (const int i : {kRight, kRight2, kDown}) over[i] /= under[i];
+    HOOKE_PULL(o1 - 1, p1 + pad - 1)
+    add_shifted(force.x, over[kRight] * d[kRight].x, right.x, 1);
+    add_shifted(force.y, over[kRight] * d[kRight].y, right.y, 1);
+    add_shifted(force.z, over[kRight] * d[kRight].z, right.z, 1);
+    add_shifted(force.x, over[kRight2] * d[kRight2].x, right2.x, 2);
+    add_shifted(force.y, over[kRight2] * d[kRight2].y, right2.y, 2);
+    add_shifted(force.z, over[kRight2] * d[kRight2].z, right2.z, 2);
+    HOOKE_OWN(kDown, p0)
+    HOOKE_ROOT(kDiagonal, x1 + 1, v1 + 1)
+    HOOKE_ROOT(kAntidiagonal, x1 - 1, v1 - 1)
+    HOOKE_ROOT(kDown2, x2, v2)
+    HOOKE_PULL(o1 + 1, p1 + 2 * pad + 1)
+    for (const int i : {kDiagonal, kAntidiagonal, kDown2}) over[i] /= under[i];
+    HOOKE_PULL(o2, p2 + 3 * pad)
+    HOOKE_OWN(kDiagonal, p0 + pad)
+    HOOKE_OWN(kAntidiagonal, p0 + 2 * pad)
+    HOOKE_OWN(kDown2, p0 + 3 * pad)
+#undef HOOKE_ROOT
+#undef HOOKE_PULL
+#undef HOOKE_OWN
+    V scale, mass;
+    load(scale, row.scale + first), load(mass, row.mass + first);
+    for (int k = 0; k < 3; ++k) {
+      V y = scale * (k == 0 ? force.x : k == 1 ? force.y : force.z), y1, y2;
+      if constexpr (extra) {
+        V more;
+        load(more, row.extra + k * pad + first);
+        y += mass * more;
+      } else {
+        y += mass * row.gravity[k];
+      }
+      if (row.right) store(y, row.right + k * pad + first);
+      load(y1, row.z1 + k * plane + first), load(y2, row.z2 + k * plane + first);
+      y = y - row.w1 * y1 - row.w2 * y2;
+      store(y, row.z + k * plane + first);
+    }
+    x0 += n, x1 += n, x2 += n, o1 += n, o2 += n, p0 += n, p1 += n, p2 += n;
+    stiffness += 6 * n, rest += 12 * n;
+    if constexpr (damped) v0 += n, v1 += n, v2 += n, damping += 6 * n;
+  }
+}
+
 template <class S>
-HOOKE_INLINE void row_solve(SheetRowSolve<S>& block) {
+HOOKE_INLINE void any_forward(const SheetForward<S>& row) {
+  if (row.damping)
+    row.extra ? forward<S, true, true>(row) : forward<S, true, false>(row);
+  else
+    row.extra ? forward<S, false, true>(row) : forward<S, false, false>(row);
+}
+
+// Columns first, on the way in. Then a lane a row: tiles are turned on the way in and out, so that the
+// recurrences along rows run over vectors, too.
+template <class S>
+HOOKE_INLINE void back(const SheetBack<S>& given) {
+  const SheetBack<S> block = given;  // a copy that no store can change
   using V = typename Pack<S>::Type;
   constexpr int n = kLanes<S>;
   const S *below = block.below, *below2 = block.below2, *above = block.above, *above2 = block.above2,
           *inverse_pivot = block.inverse_pivot;
+  const std::ptrdiff_t stride = block.stride;
   S* y = block.scratch;
   V near[3] = {}, far[3] = {};
   for (int first = 0; first < block.columns; first += n) {
-    V tile[3][n];
+    V tile[3][n], under[3], under2[3];
     for (int k = 0; k < 3; ++k) {
-      const S* z = block.z + k * block.plane + first;
-      for (int i = 0; i < n; ++i) load(tile[k][i], z + i * block.stride);
+      const S* wait = block.wait + k * stride + first;
+      load(under[k], wait), load(under2[k], wait + 3 * stride);
+    }
+    HOOKE_UNROLL
+    for (int i = n - 1; i >= 0; --i) HOOKE_UNROLL
+    for (int k = 0; k < 3; ++k) {
+      load(tile[k][i], block.z + k * block.plane + i * stride + first);
+      tile[k][i] = tile[k][i] * block.pivot[i] - under2[k] * block.next2[i] - under[k] * block.next[i];
+      under2[k] = under[k], under[k] = tile[k][i];
+    }
+    HOOKE_UNROLL
+    for (int k = 0; k < 3; ++k) {
+      S* wait = block.wait + k * stride + first;
+      store(under[k], wait), store(under2[k], wait + 3 * stride);
+      if (block.add) HOOKE_UNROLL
+      for (int i = 0; i < n; ++i) {
+        V more;
+        load(more, block.add + (k * n + i) * stride + first);
+        tile[k][i] += more;
+      }
       transpose(tile[k]);
     }
-    for (int i = 0; i < n; ++i)
-      for (int k = 0; k < 3; ++k) {
-        const V now = tile[k][i] - below2[first + i] * far[k] - below[first + i] * near[k];
-        far[k] = near[k], near[k] = now;
-        store(now, y + n * (3 * (first + i) + k));
-      }
+    HOOKE_UNROLL
+    for (int i = 0; i < n; ++i) HOOKE_UNROLL
+    for (int k = 0; k < 3; ++k) {
+      tile[k][i] = tile[k][i] - far[k] * below2[first + i] - near[k] * below[first + i];
+      far[k] = near[k], near[k] = tile[k][i];
+      store(tile[k][i], y + n * (3 * first + k * n + i));
+    }
   }
   for (int k = 0; k < 3; ++k) near[k] = far[k] = V{};
   for (int first = block.columns - n; first >= 0; first -= n) {
     V tile[3][n];
-    for (int i = n - 1; i >= 0; --i)
-      for (int k = 0; k < 3; ++k) {
-        V now;
-        load(now, y + n * (3 * (first + i) + k));
-        now = now * inverse_pivot[first + i] - above2[first + i] * far[k] - above[first + i] * near[k];
-        far[k] = near[k], near[k] = now;
-        tile[k][i] = now;
-      }
+    HOOKE_UNROLL
+    for (int i = n - 1; i >= 0; --i) HOOKE_UNROLL
     for (int k = 0; k < 3; ++k) {
-      S* z = block.z + k * block.plane + first;
+      load(tile[k][i], y + n * (3 * first + k * n + i));
+      tile[k][i] = tile[k][i] * inverse_pivot[first + i] - far[k] * above2[first + i] - near[k] * above[first + i];
+      far[k] = near[k], near[k] = tile[k][i];
+    }
+    HOOKE_UNROLL
+    for (int k = 0; k < 3; ++k) {
       transpose(tile[k]);
-      for (int i = 0; i < n; ++i) store(tile[k][i], z + i * block.stride);
+      HOOKE_UNROLL
+      for (int i = 0; i < n; ++i) store(tile[k][i], block.z + k * block.plane + i * stride + first);
     }
   }
 }
 
 }  // namespace
 
-HOOKE_CLONES void sheet_springs(SheetRow<float>& row) { all_springs(row); }
-HOOKE_CLONES void sheet_springs(SheetRow<double>& row) { all_springs(row); }
-HOOKE_CLONES void sheet_right(SheetRight<float>& row) { right_side(row); }
-HOOKE_CLONES void sheet_right(SheetRight<double>& row) { right_side(row); }
-HOOKE_CLONES void sheet_sweep(SheetSweep<float>& row) { sweep(row); }
-HOOKE_CLONES void sheet_sweep(SheetSweep<double>& row) { sweep(row); }
-HOOKE_CLONES void sheet_row_solve(SheetRowSolve<float>& block) { row_solve(block); }
-HOOKE_CLONES void sheet_row_solve(SheetRowSolve<double>& block) { row_solve(block); }
-HOOKE_CLONES void sheet_move(SheetMove<float>& row) { move(row); }
-HOOKE_CLONES void sheet_move(SheetMove<double>& row) { move(row); }
+HOOKE_CLONES void sheet_forward(const SheetForward<float>& row) { any_forward(row); }
+HOOKE_CLONES void sheet_forward(const SheetForward<double>& row) { any_forward(row); }
+HOOKE_CLONES void sheet_back(const SheetBack<float>& block) { back(block); }
+HOOKE_CLONES void sheet_back(const SheetBack<double>& block) { back(block); }
+HOOKE_CLONES void sheet_squares(int n, const float* difference, float* out) { square(n, difference, out); }
+HOOKE_CLONES void sheet_squares(int n, const double* difference, double* out) { square(n, difference, out); }
+HOOKE_CLONES void sheet_move(const SheetMove<float>& row) { move(row); }
+HOOKE_CLONES void sheet_move(const SheetMove<double>& row) { move(row); }
 HOOKE_CLONES void sheet_sum(SheetSum<float>& row) { sum_up(row); }
 HOOKE_CLONES void sheet_sum(SheetSum<double>& row) { sum_up(row); }
 

@@ -1,6 +1,8 @@
 // The inner loops of filtered leapfrog. Compiled once for each instruction set and chosen at run
-// time, all with the same bits; internal to hooke::softbody and not installed.
+// time; internal to hooke::softbody and not installed.
 #pragma once
+
+#include <hooke/softbody/filtered_grid.hpp>
 
 #include <cstddef>
 
@@ -10,70 +12,65 @@ namespace hooke::softbody {
 template <class S>
 inline constexpr int kLanes = int(32 / sizeof(S));
 
-/// The springs that start in one row of a grid. x[j] are the rows from it on, of which columns + 2
-/// values may be read; spring[d] holds stiffness, rest length, its square and damping of
-/// Direction d, each `stride` values. Forces are added to rows f[0] and f[1] and set in f[2].
-/// rows_below: 2, or fewer at the end of the grid.
+/// Below this length [m], squared, a spring has no direction. It is added to all squares of lengths.
 template <class S>
-struct SheetRow {
-  int columns, rows_below;
-  std::ptrdiff_t stride;
-  const S* x[3][3];
-  const S* v[3][3];  // null without dampers
-  const S* spring[6];
-  S* f[3][3];
-  S* scratch;  // 3 (columns + 2)
-};
-void sheet_springs(SheetRow<float>& row);
-void sheet_springs(SheetRow<double>& row);
+inline constexpr S kTiny = S(1e-24);
 
-/// f becomes the right side of a row: scale · f + mass[i] (gravity, or extra[i] where not null).
-template <class S>
-struct SheetRight {
-  int columns;
-  S* f[3];
-  S scale, gravity[3];
-  const S* mass;
-  const S* extra[3];
-};
-void sheet_right(SheetRight<float>& row);
-void sheet_right(SheetRight<double>& row);
+/// Squares of lengths of n differences x|y|z, the same bits as the springs'.
+void sheet_squares(int n, const float* difference, float* out);
+void sheet_squares(int n, const double* difference, double* out);
 
-/// y = pivot y - w1 y1 - w2 y2 for three coordinates that lie `plane` apart.
+/// The forces on a row of a grid, and behind them the first half of the solves down the columns:
+/// z = b - w1 z1 - w2 z2 with b = scale f + mass g. Rows of positions and velocities have three coordinates `pad`
+/// apart, may be read from -1 to columns + 2 and start on a vector, as all others do.
 template <class S>
-struct SheetSweep {
-  int columns;
-  std::ptrdiff_t plane;
-  S* y;
-  const S *y1, *y2;
-  S pivot, w1, w2;
+struct SheetForward {
+  int columns;  // a multiple of kLanes
+  std::ptrdiff_t pad, plane;
+  const S *x[3], *v[3];                 // this row and the next two; v: for dampers only
+  const S *above, *above2;              // positions of the row before, and the one before that
+  S* pull;                              // gets force over length of kDown, kDiagonal, kAntidiagonal, kDown2
+  const S *pull1, *pull2;               // what it got in the two rows before
+  const S *stiffness, *rest, *damping;  // by vector and direction; L then L²; damping: null without dampers.
+                                        // An antidiagonal spring is kept with its upper end
+  const S *scale, *mass;                // by column
+  S gravity[3];
+  const S* extra;  // null, or accelerations in place of gravity
+  S* right;        // null, or gets b, `pad` apart
+  S* z;
+  const S *z1, *z2;
+  S w1, w2;
 };
-void sheet_sweep(SheetSweep<float>& row);
-void sheet_sweep(SheetSweep<double>& row);
+void sheet_forward(const SheetForward<float>& row);
+void sheet_forward(const SheetForward<double>& row);
 
-/// Solves along kLanes rows of three coordinates; columns is a multiple of kLanes. below[c] = L(c, c - 1),
-/// below2[c] = L(c, c - 2), above[c] = L(c + 1, c), above2[c] = L(c + 2, c).
+/// Solves kLanes rows from z on in place: the second half down the columns, then along the rows. below[c] =
+/// L(c, c - 1), below2[c] = L(c, c - 2), above[c] = L(c + 1, c), above2[c] = L(c + 2, c) along rows; pivot, next,
+/// next2 are 1 / D, above and above2 of the columns, at these rows.
 template <class S>
-struct SheetRowSolve {
-  int columns;
+struct SheetBack {
+  int columns;  // a multiple of kLanes
   std::ptrdiff_t plane, stride;
   S* z;
+  S* wait;       // six rows: the two rows below as the columns' solve left them, three coordinates each
+  const S* add;  // null, or what is added between the solves: 3 · kLanes rows
+  const S *pivot, *next, *next2;
   const S *below, *below2, *above, *above2, *inverse_pivot;
   S* scratch;  // 3 · kLanes · columns
 };
-void sheet_row_solve(SheetRowSolve<float>& block);
-void sheet_row_solve(SheetRowSolve<double>& block);
+void sheet_back(const SheetBack<float>& block);
+void sheet_back(const SheetBack<double>& block);
 
-/// v += kick z; x += h v; predicted = v + ½ z where not null. One coordinate of a row.
+/// v += kick z; x += h v; predicted = v + ½ z where not null. Three coordinates of a row.
 template <class S>
 struct SheetMove {
   int columns;
-  S *x, *v, *predicted;
-  const S* z;
+  S *x[3], *v[3], *predicted[3];
+  const S* z[3];
   S kick, h;
 };
-void sheet_move(SheetMove<float>& row);
-void sheet_move(SheetMove<double>& row);
+void sheet_move(const SheetMove<float>& row);
+void sheet_move(const SheetMove<double>& row);
 
 /// sum += weight · y for three coordinates.
 template <class S>

@@ -1,7 +1,5 @@
 #include <hooke/softbody/filtered_sheet.hpp>
 
-#include <hooke/softbody/filtered_kernels.hpp>
-
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -38,49 +36,71 @@ FilteredSheet<S>::FilteredSheet(std::string name, PointMasses<S> points, const M
       columns_(plan_.grid.columns),
       stride_(round_up(columns_, kLanes<S>)),
       padded_rows_(round_up(rows_, kLanes<S>)),
-      plane_((padded_rows_ + 3) * stride_) {
+      plane_((padded_rows_ + 1) * stride_),
+      pad_(stride_ + 2 * kMargin) {
   damped_ = field_.uses_velocity();
   even_ = (plan_.mass_model.row == 1).all() && (plan_.mass_model.column == 1).all();
   lay_out_springs();
-  z_.assign(std::size_t(3 * plane_), S(0));
-  scratch_.assign(std::size_t(3 * (columns_ + 2)), S(0));
-  last_row_.assign(std::size_t(6 * (columns_ + 2)), S(0));
-  mass_row_.assign(std::size_t(columns_), S(0));
-  block_.assign(std::size_t(3 * kLanes<S> * stride_), S(0));
+  z_.resize(std::size_t(3 * plane_));
+  near_x_.resize(std::size_t(15 * pad_));
+  if (damped_) near_v_.resize(std::size_t(15 * pad_));
+  pulls_.resize(std::size_t(12 * pad_));
+  for (Lines<S>* row : {&scale_row_, &mass_row_, &zero_row_}) row->resize(std::size_t(stride_));
+  for (Lines<S>* rows : {&extra_row_, &right_}) rows->resize(std::size_t(3 * pad_));
+  wait_.resize(std::size_t(6 * stride_));
+  for (Lines<S>* rows : {&add_, &block_}) rows->resize(std::size_t(3 * kLanes<S> * stride_));
 }
 
 // Rows of parameters that are the same are kept once: in a sheet of one material that is nearly all.
 template <class S>
 void FilteredSheet<S>::lay_out_springs() {
-  std::map<std::vector<S>, std::size_t> known;
+  using Rows = std::map<std::vector<S>, std::vector<Index>>;
+  Rows stiffness_rows, rest_rows, damping_rows;
+  std::vector<S> difference(std::size_t(3 * stride_)), square(static_cast<std::size_t>(stride_));
   const Points<S>& x = points_.position;
-  std::vector<S> row(std::size_t(4 * stride_));
-  for (int d = 0; d < kDirections; ++d) {
-    const Index rows_below = d == kDown2 ? 2 : d == kRight || d == kRight2 ? 0 : 1;
-    for (Index r = 0; r + rows_below < rows_; ++r) {
-      S *k = row.data(), *rest = k + stride_, *rest2 = rest + stride_, *damping = rest2 + stride_;
-      for (Index c = 0; c < stride_; ++c) {
-        k[c] = damping[c] = 0, rest[c] = rest2[c] = 1;
-        const int i = c < columns_ ? plan_.grid.springs[std::size_t(d)][std::size_t(r * columns_ + c)] : -1;
+  const auto place = [](Index column, int fields, int field) {
+    return std::size_t((column / kLanes<S> * fields + field) * kLanes<S> + column % kLanes<S>);
+  };
+  for (Index r = 0; r < rows_; ++r) {
+    std::vector<S> stiffness(std::size_t(6 * stride_), S(0)), damping = stiffness,
+                                                              rest(std::size_t(12 * stride_), S(1));
+    for (int d = 0; d < kDirections; ++d) {
+      std::fill(difference.begin(), difference.end(), S(1));
+      for (Index c = 0; c < columns_; ++c) {
+        // An antidiagonal spring is worked on with its upper end, which is one column further.
+        const Index from = c - (d == kAntidiagonal);
+        const int i = from < 0 ? -1 : plan_.grid.springs[std::size_t(d)][std::size_t(r * columns_ + from)];
         if (i < 0) continue;
         const Spring& spring = plan_.network->springs[std::size_t(i)];
-        k[c] = S(spring.stiffness), damping[c] = S(spring.damping);
-        if (spring.rest_length == Spring::kFromStart) {
-          // The same operations in the same order as the kernel's.
-          const S dx = x(spring.b, 0) - x(spring.a, 0), dy = x(spring.b, 1) - x(spring.a, 1),
-                  dz = x(spring.b, 2) - x(spring.a, 2);
-          rest2[c] = dx * dx + dy * dy + dz * dz;
-          rest[c] = std::sqrt(rest2[c]);
-        } else {
-          rest[c] = S(spring.rest_length);
-          rest2[c] = rest[c] * rest[c];
-        }
+        stiffness[place(c, 6, d)] = S(spring.stiffness), damping[place(c, 6, d)] = S(spring.damping);
+        for (int k = 0; k < 3; ++k)
+          difference[std::size_t(k * stride_ + c)] = spring.rest_length == Spring::kFromStart
+                                                         ? x(spring.b, k) - x(spring.a, k)
+                                                         : S(k == 0 ? spring.rest_length : 0);
       }
-      const auto [entry, is_new] = known.try_emplace(row, parameters_.size());
-      if (is_new) parameters_.insert(parameters_.end(), row.begin(), row.end());
-      first_[std::size_t(d)].push_back(entry->second);
+      sheet_squares(int(stride_), difference.data(), square.data());
+      for (Index c = 0; c < stride_; ++c) {
+        rest[place(c, 12, d)] = std::sqrt(square[std::size_t(c)]);
+        rest[place(c, 12, 6 + d)] = square[std::size_t(c)];
+      }
     }
+    stiffness_rows[std::move(stiffness)].push_back(r);
+    rest_rows[std::move(rest)].push_back(r);
+    if (damped_) damping_rows[std::move(damping)].push_back(r);
   }
+  const auto lay = [&](const Rows& rows, Lines<S>& memory, std::vector<const S*>& row) {
+    row.assign(std::size_t(rows_), nullptr);
+    if (rows.empty()) return;
+    memory.resize(rows.size() * rows.begin()->first.size());
+    S* to = memory.data();
+    for (const auto& [values, where] : rows) {
+      for (const Index r : where) row[std::size_t(r)] = to;
+      to = std::copy(values.begin(), values.end(), to);
+    }
+  };
+  lay(stiffness_rows, stiffness_, stiffness_row_);
+  lay(rest_rows, rest_, rest_row_);
+  lay(damping_rows, damping_, damping_row_);
 }
 
 template <class S>
@@ -242,55 +262,43 @@ void FilteredSheet<S>::gather_extra(double t, double h) {
             (share / (2 * step)) * (touched_v_ - points_.velocity);
 }
 
-// The springs that start in a row.
+// What forces on the coming rows are multiplied with, and their masses: nothing where points are held.
 template <class S>
-void FilteredSheet<S>::pull_row(Index row) {
-  SheetRow<S> block;
-  block.columns = int(columns_), block.rows_below = int(std::min<Index>(2, rows_ - 1 - row));
-  block.stride = stride_;
-  block.scratch = scratch_.data();
-  for (Index j = 0; j <= block.rows_below; ++j)
-    for (Index k = 0; k < 3; ++k) {
-      const bool last = row + j == rows_ - 1;
-      block.x[j][k] =
-          last ? last_row_.data() + k * (columns_ + 2) : points_.position.col(k).data() + (row + j) * columns_;
-      block.v[j][k] = !damped_ ? nullptr
-                      : last   ? last_row_.data() + (3 + k) * (columns_ + 2)
-                               : predicted_.col(k).data() + (row + j) * columns_;
-      block.f[j][k] = row_of(row + j) + k * plane_;
-    }
-  for (std::size_t d = 0; d < kDirections; ++d)
-    block.spring[d] = std::size_t(row) < first_[d].size() ? parameters_.data() + first_[d][std::size_t(row)] : nullptr;
-  sheet_springs(block);
+void FilteredSheet<S>::weigh_row(Index row, double h) {
+  const MassModel& masses = plan_.mass_model;
+  if (row > 0 && masses.row[row] == masses.row[row - 1]) return;
+  for (Index c = 0; c < columns_; ++c) {
+    const bool held = held_column_[std::size_t(c)];
+    scale_row_.data()[c] = held ? S(0) : S(h / masses.unit);
+    mass_row_.data()[c] = held ? S(0) : S(h * masses.row[row] * masses.column[c]);
+  }
 }
 
-// From the forces on a row to h (f / m + g), in units of mass.
+// Rows outside of the grid are zero; no spring acts there.
 template <class S>
-void FilteredSheet<S>::right_side(Index row, double h) {
-  const MassModel& masses = plan_.mass_model;
-  S* z = row_of(row);
-  if (row == 0 || masses.row[row] != masses.row[row - 1])
-    for (Index c = 0; c < columns_; ++c) mass_row_[std::size_t(c)] = S(h * masses.row[row] * masses.column[c]);
+void FilteredSheet<S>::fetch_row(Index row) {
+  const auto fetch = [&](const Points<S>& from, S* to) {
+    for (int k = 0; k < 3; ++k, to += pad_)
+      if (row >= 0 && row < rows_)
+        std::copy_n(&from(row * columns_, k), columns_, to);
+      else
+        std::fill_n(to, columns_, S(0));
+  };
+  fetch(points_.position, position_of(row));
+  if (damped_) fetch(predicted_, velocity_of(row));
+}
+
+// Masses on top of the filter's weigh, too.
+template <class S>
+void FilteredSheet<S>::add_odd(Index row, double h) {
   for (const Special& special : specials_) {
     if (special.row != row || special.held) continue;
     for (int k = 0; k < 3; ++k) {
       const double g = extra_on_ ? double(extra_(special.point, k)) : tick_.gravity[k];
-      z[k * plane_ + special.column] += S(masses.unit * special.extra * g);
+      const S more = S(h * special.extra * g);
+      right_.data()[k * pad_ + special.column] += more;
+      row_of(row)[k * plane_ + special.column] += more;
     }
-  }
-  SheetRight<S> right;
-  right.columns = int(columns_);
-  right.scale = S(h / masses.unit);
-  right.mass = mass_row_.data();
-  for (int k = 0; k < 3; ++k) {
-    right.f[k] = z + k * plane_;
-    right.gravity[k] = S(tick_.gravity[k]);
-    right.extra[k] = extra_on_ ? extra_.col(k).data() + row * columns_ : nullptr;
-  }
-  sheet_right(right);
-  for (int k = 0; k < 3; ++k) {
-    if (held_row_[std::size_t(row)]) std::fill_n(z + k * plane_, columns_, S(0));
-    for (const Index c : along_rows_->held) z[k * plane_ + c] = 0;
   }
 }
 
@@ -298,33 +306,42 @@ void FilteredSheet<S>::right_side(Index row, double h) {
 template <class S>
 void FilteredSheet<S>::forward(double h) {
   ++evaluations_;
-  const Index last = (rows_ - 1) * columns_;
-  for (int k = 0; k < 3; ++k) {
-    std::copy_n(points_.position.col(k).data() + last, columns_, last_row_.data() + k * (columns_ + 2));
-    if (damped_) std::copy_n(predicted_.col(k).data() + last, columns_, last_row_.data() + (3 + k) * (columns_ + 2));
-    std::fill_n(z_.data() + k * plane_, 2 * stride_, S(0));
-  }
   std::fill(special_sums_.begin(), special_sums_.end(), S(0));
-  const S* zeros = row_of(padded_rows_);
+  std::fill_n(pulls_.data(), 12 * pad_, S(0));
+  for (Index r = -2; r < 2; ++r) fetch_row(r);
+  S* zeros = row_of(padded_rows_);
+  SheetForward<S> row{};
+  row.columns = int(stride_), row.pad = pad_, row.plane = plane_;
+  row.right = specials_.empty() ? nullptr : right_.data();
+  row.extra = extra_on_ ? extra_row_.data() : nullptr;
+  for (int k = 0; k < 3; ++k) row.gravity[k] = S(tick_.gravity[k]);
   for (Index r = 0; r < rows_; ++r) {
-    pull_row(r);
-    right_side(r, h);
+    fetch_row(r + 2);
+    weigh_row(r, h);
+    for (Index j = 0; j < 3; ++j) {
+      row.x[j] = position_of(r + j);
+      row.v[j] = damped_ ? velocity_of(r + j) : nullptr;
+    }
+    row.above = position_of(r - 1), row.above2 = position_of(r - 2);
+    row.pull = pulls_of(r), row.pull1 = pulls_of(r - 1), row.pull2 = pulls_of(r - 2);
+    row.stiffness = stiffness_row_[std::size_t(r)], row.rest = rest_row_[std::size_t(r)];
+    row.damping = damping_row_[std::size_t(r)];
+    const bool held = held_row_[std::size_t(r)];
+    row.scale = held ? zero_row_.data() : scale_row_.data();
+    row.mass = held ? zero_row_.data() : mass_row_.data();
+    for (int k = 0; k < 3 && extra_on_; ++k)
+      std::copy_n(&extra_(r * columns_, k), columns_, extra_row_.data() + k * pad_);
+    row.z = row_of(r), row.z1 = r > 0 ? row_of(r - 1) : zeros, row.z2 = r > 1 ? row_of(r - 2) : zeros;
+    row.w1 = column_line_.below[r], row.w2 = column_line_.below2[r];
+    sheet_forward(row);
+    if (specials_.empty()) continue;
+    add_odd(r, h);
     for (std::size_t i = 0; i < special_rows_.size(); ++i) {
-      SheetSum<S> sum{int(columns_), plane_,
+      SheetSum<S> sum{int(columns_), pad_,
                       stride_,       special_sums_.data() + i * std::size_t(3 * stride_),
-                      row_of(r),     S(column_response_[i][r])};
+                      right_.data(), S(column_response_[i][r])};
       sheet_sum(sum);
     }
-    if (!filtered_ && even_ && specials_.empty()) continue;
-    SheetSweep<S> sweep{int(columns_),
-                        plane_,
-                        row_of(r),
-                        r > 0 ? row_of(r - 1) : zeros,
-                        r > 1 ? row_of(r - 2) : zeros,
-                        S(1),
-                        column_line_.below[r],
-                        column_line_.below2[r]};
-    sheet_sweep(sweep);
   }
 }
 
@@ -379,17 +396,15 @@ void FilteredSheet<S>::follow_pins(Index row, double kick) {
 
 template <class S>
 void FilteredSheet<S>::move_row(Index row, S kick, S drift) {
+  const Index first = row * columns_;
+  SheetMove<S> move{};
+  move.columns = int(columns_), move.kick = kick, move.h = drift;
   for (int k = 0; k < 3; ++k) {
-    const Index first = row * columns_;
-    SheetMove<S> move{int(columns_),
-                      points_.position.col(k).data() + first,
-                      points_.velocity.col(k).data() + first,
-                      needs_velocity() ? predicted_.col(k).data() + first : nullptr,
-                      row_of(row) + k * plane_,
-                      kick,
-                      drift};
-    sheet_move(move);
+    move.x[k] = &points_.position(first, k), move.v[k] = &points_.velocity(first, k);
+    if (needs_velocity()) move.predicted[k] = &predicted_(first, k);
+    move.z[k] = row_of(row) + k * plane_;
   }
+  sheet_move(move);
 }
 
 // The second half of the solves down the columns, the solves along rows, and the move, in blocks of rows
@@ -397,47 +412,33 @@ void FilteredSheet<S>::move_row(Index row, S kick, S drift) {
 template <class S>
 void FilteredSheet<S>::back(double kick, double drift) {
   const bool solve = filtered_ || !even_ || !specials_.empty();
-  S *zeros = row_of(padded_rows_), *wait = row_of(padded_rows_ + 1), *wait2 = row_of(padded_rows_ + 2);
   if (!specials_.empty()) solve_specials(kick);
+  std::fill_n(wait_.data(), 6 * stride_, S(0));
   for (Index first = padded_rows_ - kLanes<S>; first >= 0; first -= kLanes<S>) {
     const Index end = std::min(first + kLanes<S>, rows_);
-    const bool lowest = first + kLanes<S> >= rows_;
-    for (Index r = end; solve && r-- > first;) {
-      const auto under = [&](Index row) {
-        return row < first + kLanes<S> ? row_of(row) : lowest ? zeros : row == first + kLanes<S> ? wait : wait2;
-      };
-      SheetSweep<S> sweep{int(columns_),
-                          plane_,
-                          row_of(r),
-                          under(r + 1),
-                          under(r + 2),
-                          column_line_.inverse_pivot[r],
-                          column_line_.above[r],
-                          column_line_.above2[r]};
-      sheet_sweep(sweep);
-    }
     if (solve) {
-      for (int k = 0; k < 3; ++k) {
-        std::copy_n(row_of(first) + k * plane_, columns_, wait + k * plane_);
-        std::copy_n(row_of(first + 1) + k * plane_, columns_, wait2 + k * plane_);
-      }
-      for (Index r = first; r < end; ++r)
-        for (std::size_t i = 0; i < specials_.size(); ++i) {
-          const Special& special = specials_[i];
-          const double weight = column_response_[special.row_number][r];
-          for (int k = 0; k < 3; ++k) row_of(r)[k * plane_ + special.column] += S(weight * special_kick_(Index(i), k));
-        }
-      SheetRowSolve<S> rows{int(stride_),
-                            plane_,
-                            stride_,
-                            row_of(first),
-                            row_line_.below.data(),
-                            row_line_.below2.data(),
-                            row_line_.above.data(),
-                            row_line_.above2.data(),
-                            row_line_.inverse_pivot.data(),
-                            block_.data()};
-      sheet_row_solve(rows);
+      SheetBack<S> block{};
+      block.columns = int(stride_);
+      block.plane = plane_, block.stride = stride_;
+      block.z = row_of(first);
+      block.wait = wait_.data(), block.scratch = block_.data();
+      block.pivot = &column_line_.inverse_pivot[first];
+      block.next = &column_line_.above[first], block.next2 = &column_line_.above2[first];
+      block.below = row_line_.below.data(), block.below2 = row_line_.below2.data();
+      block.above = row_line_.above.data(), block.above2 = row_line_.above2.data();
+      block.inverse_pivot = row_line_.inverse_pivot.data();
+      const auto add_specials = [&](bool on) {
+        for (std::size_t i = 0; i < specials_.size(); ++i)
+          for (Index r = first; r < end; ++r)
+            for (int k = 0; k < 3; ++k) {
+              S& place = add_.data()[(k * kLanes<S> + r - first) * stride_ + specials_[i].column];
+              place = on ? place + S(column_response_[specials_[i].row_number][r] * special_kick_(Index(i), k)) : S(0);
+            }
+      };
+      if (!specials_.empty()) block.add = add_.data();
+      add_specials(true);
+      sheet_back(block);
+      add_specials(false);
     }
     for (Index r = first; r < end; ++r) {
       if (jumps_) follow_pins(r, kick);

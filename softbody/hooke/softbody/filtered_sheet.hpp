@@ -3,7 +3,9 @@
 #pragma once
 
 #include <hooke/softbody/filtered_grid.hpp>
+#include <hooke/softbody/filtered_kernels.hpp>
 #include <hooke/softbody/filtered_leapfrog.hpp>
+#include <hooke/softbody/lines.hpp>
 #include <hooke/softbody/spring_field.hpp>
 
 #include <Eigen/LU>
@@ -41,6 +43,7 @@ class FilteredSheet final : public PointBody<S> {
   FilteredFacts facts() const;
   double kept_energy(const Vec3& gravity) const;
 
+  bool fused() const override { return false; }  // a stepper of an added field knows no filter
   using PointBody<S>::stable_step;
   double stable_step(const Method& method) const override;
   MotionFacts motion_facts() const override;
@@ -56,6 +59,8 @@ class FilteredSheet final : public PointBody<S> {
   SolveResult substep(double t, double h) override;
 
  private:
+  static constexpr Index kMargin = 64 / sizeof(S);
+
   using Base = PointBody<S>;
   using Base::points_;
   using Base::tick_;
@@ -77,8 +82,9 @@ class FilteredSheet final : public PointBody<S> {
   void meet_pins(double t, double h);
   void gather_extra(double t, double h);
   void forward(double h);
-  void pull_row(Index row);
-  void right_side(Index row, double h);
+  void weigh_row(Index row, double h);
+  void fetch_row(Index row);
+  void add_odd(Index row, double h);
   void solve_specials(double kick);
   void back(double kick, double drift);
   void follow_pins(Index row, double kick);
@@ -87,13 +93,17 @@ class FilteredSheet final : public PointBody<S> {
   double followed(Index row, Index column, int k) const;
   bool needs_velocity() const { return damped_ || this->uses_velocity(); }
   S* row_of(Index row) { return z_.data() + row * stride_; }
+  // Of rows -2 and up, five of which are there at once; three for what springs wait with.
+  S* position_of(Index row) { return near_x_.data() + (row + 5) % 5 * 3 * pad_ + kMargin; }
+  S* velocity_of(Index row) { return near_v_.data() + (row + 5) % 5 * 3 * pad_ + kMargin; }
+  S* pulls_of(Index row) { return pulls_.data() + (row + 3) % 3 * 4 * pad_ + kMargin; }
 
   SheetPlan plan_;
   SpringField<S> field_;                // for energy and bounds
   bool damped_ = false, even_ = false;  // even: no mass differs
-  Index rows_, columns_, stride_, padded_rows_, plane_;
-  std::vector<S> parameters_;                                // rows of stiffness, rest length, its square and damping
-  std::array<std::vector<std::size_t>, kDirections> first_;  // by row: where they are
+  Index rows_, columns_, stride_, padded_rows_, plane_, pad_;
+  Lines<S> stiffness_, rest_, damping_;  // rows of vectors of six directions; rest_: L, then L²
+  std::vector<const S*> stiffness_row_, rest_row_, damping_row_;
 
   // Of the present step, pins and contacts.
   bool stale_ = true;  // pins have changed
@@ -117,8 +127,9 @@ class FilteredSheet final : public PointBody<S> {
   bool known_ = false;  // z_ is the kick of the coming tick's start
   Vec3 known_gravity_{0, 0, 0};
   bool extra_on_ = false, jumps_ = false;
-  std::vector<S> z_;  // kicks: three planes of rows, then a row of zeros and two that wait
-  std::vector<S> scratch_, last_row_, mass_row_, block_;
+  Lines<S> z_;                        // kicks: three planes of rows, then a row of zeros
+  Lines<S> near_x_, near_v_, pulls_;  // of the rows around the present one, with margins
+  Lines<S> scale_row_, mass_row_, extra_row_, zero_row_, right_, wait_, add_, block_;
   Points<S> extra_, predicted_, from_, touched_x_, touched_v_;
   Points<S> place_x_, place_v_, pin_velocity_, jump_;  // where there are moving pins; only their rows count
   std::vector<Points<S>> column_jump_;                 // by held column, along it
