@@ -271,7 +271,9 @@ class Chooser {
           // Too large steps freeze: two frozen runs agree as well, three that come closer do not.
           const bool settling = std::isfinite(change_before) && change_before > 1.5 * change;
           const double order = settling ? std::clamp(std::log2(change_before / change), 0.7, 1.8) : 1.0;
-          const bool believed = settling || travel / double(steps) < 0.25 || change + change_before < 0.02 * wanted_;
+          const double crossed = travel / double(steps);
+          const bool quiet_enough = change + change_before < 0.02 * wanted_ && crossed < FilteredFacts::kFreeze;
+          const bool believed = settling || crossed < 0.25 || quiet_enough;
           const double error = change / (std::pow(2.0, order) - 1);
           change_before = change;
           const double finer = std::pow(kSafety * error / wanted_, 1 / order);
