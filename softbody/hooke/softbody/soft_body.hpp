@@ -12,7 +12,7 @@
 namespace hooke::softbody {
 
 /// In double-float, positions and velocities are held in two floats each: on undamped springs of a grid,
-/// by splitting methods, at 1.5 × float's cost. The body's own numbers are double then; ticks with
+/// by splitting methods; for machines that are slow at double. The body's own numbers are double then; ticks with
 /// contacts or driven pins are computed in double.
 enum class Precision { Float, Double, DoubleFloat };
 
