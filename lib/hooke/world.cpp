@@ -64,7 +64,8 @@ StepReport World::update(double frame_seconds) {
   const double waiting = clock_.remainder();
   const std::int64_t ticks = clock_.bank(frame_seconds);
   const double t0 = clock_.time(), t1 = clock_.time_at(clock_.ticks() + ticks);
-  for_each_body([&](Body& body, std::size_t) { body.begin_frame(frame_seconds, waiting, t0, t1); });
+  const auto begin = [&](Body& body, std::size_t) { body.begin_frame(frame_seconds, waiting, t0, t1); };
+  for_each_body(std::ref(begin));  // by reference: a std::function of all it holds would allocate
   for (std::int64_t i = 0; i < ticks; ++i)
     if (StepReport report = step(); !report.good()) return report;
   clear_forces();

@@ -32,7 +32,7 @@ struct Effort {
   int rounds() const { return quick ? 5 : 9; }
 };
 
-const char* name_of(Precision precision) { return precision == Precision::Float ? "float" : "double"; }
+const char* text_of(Precision precision) { return precision == Precision::Float ? "float" : "double"; }
 
 const Method& method_of(const std::string& name) {
   for (const Method* method : methods())
@@ -129,7 +129,7 @@ Table kernel(const Effort& effort) {
       const Ratio ratio = times_faster(mine, other);
       const Points<double>& answer = form ? mesh_reference : reference.positions;
       table.add({form ? "shuffled mesh" : "grid",
-                 name_of(precision),
+                 text_of(precision),
                  {1e9 * mine.least() / springs / steps, "%.2f"},
                  {rms(run(form ? as_mesh : as_grid).positions, answer), "%.1e"},
                  {1e9 * other.least() / springs / steps, "%.2f"},
@@ -200,7 +200,7 @@ Table accuracy(const Effort& effort) {
         table.add({n,
                    "yardstick",
                    "velocity-verlet",
-                   name_of(precision),
+                   text_of(precision),
                    {yardstick_step(n), "%.3e"},
                    {yardstick_error(plain_sheet, precision, steps, reference.positions), "%.1e"},
                    {seconds, "%.4f"},
@@ -211,7 +211,7 @@ Table accuracy(const Effort& effort) {
         table.add({n,
                    "Hooke",
                    std::string(c.settings.motion.method->name),
-                   name_of(c.settings.precision),
+                   text_of(c.settings.precision),
                    {c.settings.motion.dt, "%.3e"},
                    {c.error, "%.1e"},
                    {seconds, "%.4f"},

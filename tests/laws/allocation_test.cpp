@@ -1,0 +1,111 @@
+// No allocation in a step: once a world runs, it asks for no memory.
+#include <hooke/softbody/soft_body.hpp>
+#include <hooke/world.hpp>
+
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <cerrno>
+#include <cstdlib>
+
+// Every request for memory is counted, by operator new and by Eigen alike. Sanitizers bring a malloc of their own.
+#if defined(__GLIBC__) && !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
+#define HOOKE_COUNTS_ALLOCATIONS
+namespace {
+std::atomic<long> requests{0};
+}
+extern "C" {
+void* __libc_malloc(std::size_t);
+void* __libc_calloc(std::size_t, std::size_t);
+void* __libc_realloc(void*, std::size_t);
+void* __libc_memalign(std::size_t, std::size_t);
+void* malloc(std::size_t size) { return requests++, __libc_malloc(size); }
+void* calloc(std::size_t count, std::size_t size) { return requests++, __libc_calloc(count, size); }
+void* realloc(void* before, std::size_t size) { return requests++, __libc_realloc(before, size); }
+void* memalign(std::size_t alignment, std::size_t size) { return requests++, __libc_memalign(alignment, size); }
+void* aligned_alloc(std::size_t alignment, std::size_t size) { return memalign(alignment, size); }
+int posix_memalign(void** out, std::size_t alignment, std::size_t size) {
+  return (*out = memalign(alignment, size)) ? 0 : ENOMEM;
+}
+}
+#endif
+
+namespace hooke::test {
+namespace {
+
+#ifdef HOOKE_COUNTS_ALLOCATIONS
+
+using softbody::Precision;
+using softbody::SoftBodySettings;
+
+struct Case {
+  const char* name;
+  double damping_ratio = 0;
+  void (*body)(SoftBodySettings&) = [](SoftBodySettings&) {};
+  void (*world)(World&) = [](World&) {};
+};
+
+class NoAllocation : public testing::TestWithParam<Case> {};
+
+TEST(Counter, SeesNewAndEigen) {
+  const long before = requests;
+  const auto by_new = std::make_unique<double>(1);
+  EXPECT_EQ(requests, before + 1) << by_new.get();
+  const Points<double> by_eigen = Points<double>::Zero(100, 3);
+  EXPECT_EQ(requests, before + 2) << by_eigen(0, 0);
+}
+
+// The automatic step's estimates, thirty a second, are among what is counted.
+TEST_P(NoAllocation, WhileAWorldRuns) {
+  for (const Precision precision : {Precision::Float, Precision::Double})
+    for (const double tick_rate : {60.0, 240.0}) {
+      softbody::ClothMaterial material;
+      material.damping_ratio = {GetParam().damping_ratio, GetParam().damping_ratio, GetParam().damping_ratio};
+      SoftBodySettings settings =
+          softbody::settings_of(softbody::cloth_from_grid(1, 1, 20, 20, {1, 0, 0}, {0, -1, 0.2}, material));
+      for (Index i = 0; i < 20; ++i) settings.pins.push_back(i);
+      settings.precision = precision;
+      GetParam().body(settings);
+      World world(tick_rate);
+      world.add(softbody::make_soft_body(settings));
+      GetParam().world(world);
+      ASSERT_TRUE(world.update(1).good());
+      const long before = requests;
+      for (int frame = 0; frame < 30; ++frame) world.update(1.0 / 60);
+      EXPECT_EQ(requests - before, 0) << "in half a second, " << (precision == Precision::Float ? "float" : "double")
+                                      << ", " << tick_rate << " ticks a second";
+      EXPECT_NEAR(world.time(), 1.5, 1.0 / 60);
+    }
+}
+
+const Case kCases[] = {Case{"Undamped"},
+                       Case{"Damped", 0.05},
+                       Case{"FixedStep", 0, [](SoftBodySettings& s) { s.motion.dt = 1e-4; }},
+                       Case{"Mesh", 0,
+                            [](SoftBodySettings& s) {  // no grid: one spring across
+                              auto network = *s.network;
+                              network.springs.push_back({0, 399, 1});
+                              s.network = std::make_shared<const softbody::SpringNetwork>(network);
+                            }},
+
+                       Case{"Drag", 0,
+                            [](SoftBodySettings& s) {
+                              s.linear_drag = 1e-4;
+                              s.quadratic_drag = 1e-4;
+                            }},
+                       Case{"GlobalDamping", 0, [](SoftBodySettings&) {}, [](World& world) { world.set_damping(0.2); }},
+
+                       Case{"DrivenPins", 0.05, [](SoftBodySettings&) {},
+                            [](World& world) {
+                              world.bodies()[0]->drive_pins(
+                                  {0, 1}, [](double t, Points<double>& x) { x << 0, 0.01 * t, 0, 0.05, 0.01 * t, 0; });
+                            }},
+                       Case{"TwoThreads", 0, [](SoftBodySettings&) {}, [](World& world) { world.set_threads(2); }}};
+
+INSTANTIATE_TEST_SUITE_P(Laws, NoAllocation, testing::ValuesIn(kCases),
+                         [](const auto& test) { return test.param.name; });
+
+#endif
+
+}  // namespace
+}  // namespace hooke::test
