@@ -56,7 +56,7 @@ struct SolverChoice : Candidate {
   bool meets = false;                               ///< false: nothing does; this is the most accurate there is
   std::string reason;                               ///< one line
   double pilot_evaluations = 0, pilot_seconds = 0;  ///< what choosing cost
-  std::vector<Candidate> rejected;  ///< the dearer and the less accurate ones, cheapest first
+  std::vector<Candidate> rejected;                  ///< the dearer and the less accurate ones, cheapest first
 
   /// Writes method, precision and step.
   void apply(SoftBodySettings& settings) const;
