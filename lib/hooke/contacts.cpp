@@ -267,7 +267,8 @@ void Contacts<S>::resolve(double t0, const Points<S>& from, double t1, const Val
     // Somebody was thrown farther than a tick's bound: look again from where this substep began.
     if (((x - start_).square().rowwise().sum() > reach_.square()).any()) {
       std::swap(previous_, solids_);
-      find_candidates(from, (x - from) / h, std::max(tick_end_ - t0, t1 - t0));
+      average_velocity_ = (x - from) / h;
+      find_candidates(from, average_velocity_, std::max(tick_end_ - t0, t1 - t0));
       std::swap(previous_, solids_);
     }
     int last = -1;

@@ -74,6 +74,7 @@ class Contacts {
   std::vector<Solid> solids_, previous_;
   std::vector<S> solid_move_;
   std::vector<Candidate> candidates_;
+  Points<S> average_velocity_;
   std::vector<Touch> touches_;  // of the last resolve
   std::vector<const Collider*> callbacks_;
   Points<S> start_, lower_, upper_;

@@ -100,6 +100,17 @@ const Case kCases[] = {Case{"Undamped"},
                               world.bodies()[0]->drive_pins(
                                   {0, 1}, [](double t, Points<double>& x) { x << 0, 0.01 * t, 0, 0.05, 0.01 * t, 0; });
                             }},
+                       Case{"Wind", 0.05,
+                            [](SoftBodySettings& s) {
+                              s.triangles = {{0, 1, 20}, {1, 21, 20}, {210, 211, 230}};
+                              s.wind = softbody::Wind{.velocity = {0, 0, 3}};
+                            }},
+                       Case{"Contact", 0.05, [](SoftBodySettings&) {},
+                            [](World& world) {
+                              Collider ball;
+                              ball.name = "ball", ball.shapes = {Sphere{{0, -0.6, -0.1}, 0.3}};
+                              world.add_collider(ball);
+                            }},
                        Case{"TwoThreads", 0, [](SoftBodySettings&) {}, [](World& world) { world.set_threads(2); }}};
 
 INSTANTIATE_TEST_SUITE_P(Laws, NoAllocation, testing::ValuesIn(kCases),

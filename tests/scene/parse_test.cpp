@@ -152,7 +152,7 @@ const std::vector<Case>& cases() {
       {"Method", grid(R"("solver": {"method": "euler"})"),
        "bodies[0].solver.method: must be one of explicit-euler, semi-implicit-euler"},
       {"Precision", grid(R"("solver": {"precision": "half"})"),
-       "bodies[0].solver.precision: must be one of float, double, got \"half\""},
+       "bodies[0].solver.precision: must be one of float, double, double-float, got \"half\""},
       {"DtNegative", grid(R"("solver": {"dt": -1e-3})"), "bodies[0].solver.dt: must be positive [s], got -0.001"},
       {"Thickness", grid(R"("thickness": -1)"), "bodies[0].thickness: must be 0 or more [m]"},
       {"Color", grid(R"("color": [0, 2, 0])"), "bodies[0].color[1]: must be from 0 to 1"},

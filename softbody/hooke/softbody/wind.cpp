@@ -125,8 +125,9 @@ void WindField<S>::add_force(const Points<S>& x, const Points<S>& v, double t, P
 
 // Per point, an upper bound of the derivative of the force by velocity [N·s/m].
 template <class S>
-Values<S> WindField<S>::damping(const Points<S>& x, const Points<S>& v) const {
-  Values<S> out = Values<S>::Zero(x.rows());
+const Values<S>& WindField<S>::damping(const Points<S>& x, const Points<S>& v) const {
+  Values<S>& out = damping_;
+  out.setZero(x.rows());
   const double mean = wind_.velocity.norm() * (1 + wind_.gust);
   const double scale = wind_.air_density * (wind_.drag + wind_.lift) / 3;
   for (const Triangle& t : triangles_) {

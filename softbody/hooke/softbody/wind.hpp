@@ -48,11 +48,12 @@ class WindField final : public ForceField<S> {
   struct Run {  // triangles whose corners all move on by one point from one to the next
     Index corner[3], count;
   };
-  Values<S> damping(const Points<S>& x, const Points<S>& v) const;
+  const Values<S>& damping(const Points<S>& x, const Points<S>& v) const;
 
   Wind wind_;
   std::vector<Run> runs_;
   std::vector<Triangle> triangles_, loose_;
+  mutable Values<S> damping_;  // scratch: a field belongs to one body, which one thread moves
 };
 
 extern template class WindField<float>;
