@@ -102,7 +102,6 @@ void Contacts<S>::begin_tick(std::span<const Collider> colliders, const PointMas
 // their box first: neighbours in memory are mostly neighbours in space.
 template <class S>
 void Contacts<S>::find_candidates(const Points<S>& x, const Points<S>& v, double seconds) {
-  constexpr Index kRun = 64;
   start_ = x;
   reach_ = (S(1.5) * S(seconds)) * (v.square().rowwise().sum().sqrt()) + S(kSlack);
   candidates_.clear();

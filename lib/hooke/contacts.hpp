@@ -78,7 +78,9 @@ class Contacts {
   std::vector<Touch> touches_;  // of the last resolve
   std::vector<const Collider*> callbacks_;
   Points<S> start_, lower_, upper_;
-  Values<S> reach_, gap_, along_, farthest_;
+  Values<S> reach_, farthest_;
+  static constexpr Index kRun = 64;  // points that are looked at together
+  Eigen::Array<S, Eigen::Dynamic, 1, 0, kRun, 1> gap_, along_;
   Points<double> world_, normal_;
   Values<double> distance_;
 };
