@@ -43,7 +43,7 @@ struct Energy {
 /// How a body is moved.
 struct MotionFacts {
   std::string method;            ///< its name; empty: the body is not moved by one
-  std::string precision;         ///< "float" or "double"
+  std::string precision;         ///< "float", "double" or "double-float"
   Index substeps = 0;            ///< of the last tick
   double stable_step = 0;        ///< [s], in the present state; infinity: any; 0: none
   double wanted_dt = 0;          ///< [s]; 0: automatic

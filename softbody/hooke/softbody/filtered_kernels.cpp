@@ -1,6 +1,7 @@
 // Loops that the compiler turns into vector code, and vectors of 32 bytes, one clone an instruction set. Only
 // IEEE operations on one lane, contracted where there is multiply-add: all instruction sets that have it give
 // the same bits, and so do those that have not.
+#include <hooke/softbody/clones.hpp>
 #include <hooke/softbody/filtered_kernels.hpp>
 
 #include <cmath>
@@ -8,23 +9,13 @@
 #include <initializer_list>
 #include <type_traits>
 
-// Sanitizers run before the dispatcher is resolved and crash in it.
-#if defined(__x86_64__) && defined(__GNUC__) && !defined(__clang__) && !defined(__SANITIZE_ADDRESS__) && \
-    !defined(__SANITIZE_THREAD__)
-#define HOOKE_CLONES __attribute__((target_clones("default", "arch=x86-64-v3", "arch=x86-64-v4")))
-#else
-#define HOOKE_CLONES
-#endif
 #if defined(__clang__)
-#define HOOKE_INDEPENDENT _Pragma("clang loop vectorize(assume_safety)")
 #define HOOKE_UNROLL _Pragma("clang loop unroll(full)")
 #else
-#define HOOKE_INDEPENDENT _Pragma("GCC ivdep")
 #define HOOKE_UNROLL _Pragma("GCC unroll 8")
 #endif
 // One multiply-add after the other, wherever it is written.
 #define HOOKE_SQUARE(x, y, z) ((z) * (z) + ((y) * (y) + ((x) * (x) + kTiny<S>)))
-#define HOOKE_INLINE static inline __attribute__((always_inline))
 
 namespace hooke::softbody {
 

@@ -1,24 +1,10 @@
 // Plain loops that the compiler turns into vector code, one clone an instruction set. Only
 // IEEE operations on one lane and no contraction: every clone gives the same bits.
+#include <hooke/softbody/clones.hpp>
 #include <hooke/softbody/kernels.hpp>
 
 #include <algorithm>
 #include <cmath>
-
-// Sanitizers run before the dispatcher is resolved and crash in it.
-#if defined(__x86_64__) && defined(__GNUC__) && !defined(__clang__) && !defined(__SANITIZE_ADDRESS__) && \
-    !defined(__SANITIZE_THREAD__)
-#define HOOKE_CLONES __attribute__((target_clones("default", "arch=x86-64-v3", "arch=x86-64-v4")))
-#else
-#define HOOKE_CLONES
-#endif
-// Outputs never overlap inputs; compilers forget __restrict once a function is inlined.
-#if defined(__clang__)
-#define HOOKE_INDEPENDENT _Pragma("clang loop vectorize(assume_safety)")
-#else
-#define HOOKE_INDEPENDENT _Pragma("GCC ivdep")
-#endif
-#define HOOKE_INLINE static inline __attribute__((always_inline))
 
 namespace hooke::softbody {
 
