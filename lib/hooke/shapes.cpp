@@ -19,6 +19,13 @@ double signed_distance(const Capsule& shape, const Vec3& point) {
   return (point - nearest_on_segment(shape.a, shape.b, point)).norm() - shape.radius;
 }
 
+double signed_distance(const Box& shape, const Vec3& point) {
+  const Vec3 outside = (shape.axes.transpose() * (point - shape.center)).cwiseAbs() - shape.half_extent;
+  return outside.cwiseMax(0.0).norm() + std::min(outside.maxCoeff(), 0.0);
+}
+
+double signed_distance(const LevelSet& shape, const Vec3& point) { return shape.grid->distance(point - shape.offset); }
+
 double signed_distance(const Shape& shape, const Vec3& point) {
   return std::visit([&](const auto& s) { return signed_distance(s, point); }, shape);
 }

@@ -11,6 +11,7 @@ namespace hooke {
 
 using Index = Eigen::Index;
 using Vec3 = Eigen::Vector3d;
+using Mat3 = Eigen::Matrix3d;
 
 /// n points or vectors, shape (n, 3), one coordinate after the other in memory (x|y|z),
 /// so that a loop over one coordinate runs through consecutive numbers.
