@@ -60,12 +60,23 @@ void Contacts<S>::place_solids(double t, std::vector<Solid>& out) {
         solid.kind = Kind::Sphere;
         solid.a = solid.b = (sphere->center - origin_).cast<S>();
         solid.radius = S(sphere->radius) + thickness_;
-      } else {
-        const auto& capsule = std::get<Capsule>(shape);
+      } else if (const auto* capsule = std::get_if<Capsule>(&shape)) {
         solid.kind = Kind::Capsule;
-        solid.a = (capsule.a - origin_).cast<S>();
-        solid.b = (capsule.b - origin_).cast<S>();
-        solid.radius = S(capsule.radius) + thickness_;
+        solid.a = (capsule->a - origin_).cast<S>();
+        solid.b = (capsule->b - origin_).cast<S>();
+        solid.radius = S(capsule->radius) + thickness_;
+      } else if (const auto* box = std::get_if<Box>(&shape)) {
+        solid.kind = Kind::Box;
+        solid.a = (box->center - origin_).cast<S>();
+        solid.b = box->half_extent.cast<S>();
+        solid.radius = thickness_;
+        solid.axes = box->axes.cast<S>();
+      } else {
+        const auto& set = std::get<LevelSet>(shape);
+        solid.kind = Kind::LevelSet;
+        solid.a = solid.b = (set.offset - origin_).cast<S>();
+        solid.radius = thickness_;
+        solid.grid = set.grid.get();
       }
       out.push_back(solid);
     }
@@ -92,8 +103,7 @@ void Contacts<S>::begin_tick(std::span<const Collider> colliders, const PointMas
   for (std::size_t s = 0; s < solids_.size(); ++s) {
     const Solid &before = solids_[s], &after = previous_[s];
     // A quarter on top of the straight way covers the bend of the path within a tick.
-    const S way = std::max((after.a - before.a).norm(), (after.b - before.b).norm());
-    solid_move_[s] = before.kind == Kind::HalfSpace ? std::abs(after.radius - before.radius) : S(1.25) * way;
+    solid_move_[s] = before.kind == Kind::HalfSpace ? moved(before, after) : S(1.25) * moved(before, after);
   }
   find_candidates(points.position, points.velocity, t1 - t0);
 }
@@ -117,12 +127,22 @@ void Contacts<S>::find_candidates(const Points<S>& x, const Points<S>& v, double
     const Solid& solid = solids_[s];
     const Vec axis = solid.b - solid.a;
     const S inverse = axis.squaredNorm() > 0 ? 1 / axis.squaredNorm() : S(0);
+    Vec low, high;  // of boxes and level sets
+    bounds(solid, low, high);
     for (Index run = 0; run < runs; ++run) {
       const Index first = run * kRun, n = std::min(kRun, x.rows() - first);
       const auto px = x.col(0).segment(first, n), py = x.col(1).segment(first, n), pz = x.col(2).segment(first, n);
       const S near = farthest_[run] + solid_move_[s];
       if (solid.kind == Kind::HalfSpace) {
         gap_ = px * solid.a[0] + py * solid.a[1] + pz * solid.a[2] - solid.radius;
+      } else if (solid.kind == Kind::Box || solid.kind == Kind::LevelSet) {
+        bool apart = false;
+        for (int k = 0; k < 3; ++k) apart = apart || low[k] - near > upper_(run, k) || high[k] + near < lower_(run, k);
+        if (apart) continue;
+        if (solid.kind == Kind::Box)
+          find_box_gaps(solid, x, first, n);
+        else
+          find_grid_gaps(solid, x, first, n, near);
       } else {
         bool apart = false;
         for (int k = 0; k < 3; ++k)
@@ -143,9 +163,77 @@ void Contacts<S>::find_candidates(const Points<S>& x, const Points<S>& v, double
   }
 }
 
+// The box along the axes of the world that holds a box or a level set.
+template <class S>
+void Contacts<S>::bounds(const Solid& solid, Vec& low, Vec& high) {
+  Vec center = solid.a, half = Vec::Zero();
+  if (solid.kind == Kind::Box) half = solid.axes.cwiseAbs() * solid.b;
+  if (solid.kind == Kind::LevelSet) {
+    center += (0.5 * (solid.grid->lower() + solid.grid->upper())).template cast<S>();
+    half = (0.5 * (solid.grid->upper() - solid.grid->lower())).template cast<S>();
+  }
+  low = (center - half).array() - solid.radius;
+  high = (center + half).array() + solid.radius;
+}
+
+template <class S>
+void Contacts<S>::find_box_gaps(const Solid& solid, const Points<S>& x, Index first, Index n) {
+  const auto px = x.col(0).segment(first, n), py = x.col(1).segment(first, n), pz = x.col(2).segment(first, n);
+  const Vec middle = solid.axes.transpose() * solid.a;
+  gap_.setZero(n);
+  for (int k = 0; k < 3; ++k) {
+    const Vec u = solid.axes.col(k);
+    gap_ += ((px * u[0] + py * u[1] + pz * u[2] - middle[k]).abs() - solid.b[k]).max(S(0)).square();
+  }
+  gap_ = gap_.sqrt() - solid.radius;
+}
+
+template <class S>
+void Contacts<S>::find_grid_gaps(const Solid& solid, const Points<S>& x, Index first, Index n, S near) {
+  gap_.resize(n);
+  for (Index i = 0; i < n; ++i) gap_[i] = clearance(solid, row(x, first + i), near);
+}
+
+// No more than how far a level set's thickened surface is; looked up in the grid only within `near` of it.
+template <class S>
+S Contacts<S>::clearance(const Solid& solid, const Vec& x, S near) {
+  const Vec3 place = (x - solid.a).template cast<double>();
+  const double away = solid.grid->away(place);
+  if (away > double(near) + double(solid.radius)) return S(away) - solid.radius;
+  // What the grid tells beyond its border may be too much by twice the way from there.
+  return S(std::max(away, solid.grid->distance(place) - 2 * away)) - solid.radius;
+}
+
+// How far a solid's surface moves at most.
+template <class S>
+S Contacts<S>::moved(const Solid& before, const Solid& after) {
+  if (before.kind == Kind::HalfSpace) return std::abs(after.radius - before.radius);
+  const S way = std::max((after.a - before.a).norm(), (after.b - before.b).norm());
+  if (before.kind != Kind::Box || before.axes == after.axes) return way;
+  return way + (after.axes - before.axes).norm() * after.b.norm();
+}
+
 template <class S>
 typename Contacts<S>::Surface Contacts<S>::surface(const Solid& solid, const Vec& x) const {
   if (solid.kind == Kind::HalfSpace) return {solid.a.dot(x) - solid.radius, solid.a};
+  if (solid.kind == Kind::Box) {
+    const Vec place = solid.axes.transpose() * (x - solid.a), beyond = place.cwiseAbs() - solid.b;
+    Vec local = beyond.cwiseMax(S(0));
+    S distance = local.norm();
+    if (distance > 0) {
+      local /= distance;
+    } else {
+      int face;
+      distance = beyond.maxCoeff(&face);
+      local[face] = 1;
+    }
+    for (int k = 0; k < 3; ++k) local[k] = std::copysign(local[k], place[k]);
+    return {distance - solid.radius, solid.axes * local};
+  }
+  if (solid.kind == Kind::LevelSet) {
+    const S distance = gap(solid, x);
+    return {distance, distance < 0 ? normal(solid, x) : Vec(0, 0, 0)};  // costs six times the distance
+  }
   Vec away = x - solid.a;
   if (solid.kind == Kind::Capsule) {
     const Vec axis = solid.b - solid.a;
@@ -158,11 +246,43 @@ typename Contacts<S>::Surface Contacts<S>::surface(const Solid& solid, const Vec
   return {distance - solid.radius, normal};
 }
 
+template <class S>
+S Contacts<S>::gap(const Solid& solid, const Vec& x) const {
+  if (solid.kind != Kind::LevelSet) return surface(solid, x).gap;
+  return S(solid.grid->distance((x - solid.a).template cast<double>())) - solid.radius;
+}
+
+// The surface's outward direction at a point on it.
+template <class S>
+typename Contacts<S>::Vec Contacts<S>::normal(const Solid& solid, const Vec& x) const {
+  if (solid.kind != Kind::LevelSet) return surface(solid, x).normal;
+  return solid.grid->normal((x - solid.a).template cast<double>()).template cast<S>();
+}
+
+// How far a point may go in before the surface nearest to it may be another than the one it came through.
+template <class S>
+S Contacts<S>::nearest_is_right(const Solid& solid) {
+  if (solid.kind == Kind::Box) return 0;  // may be thin
+  return solid.kind == Kind::LevelSet ? S(solid.grid->voxel()) : solid.radius;
+}
+
+// How deep a point may be that was put on the surface.
+template <class S>
+S Contacts<S>::skin(const Solid& solid) {
+  if (solid.kind == Kind::Box)
+    return 16 * std::numeric_limits<S>::epsilon() * (solid.a.norm() + solid.b.norm() + solid.radius);
+  return solid.kind == Kind::LevelSet ? S(0.02 * solid.grid->voxel()) : S(0);
+}
+
 // Where a point at x is after the solid has moved and taken it along.
 template <class S>
 typename Contacts<S>::Vec Contacts<S>::carried(const Solid& before, const Solid& after, const Vec& x) {
   if (before.kind == Kind::HalfSpace) return x + (after.radius - before.radius) * after.a;
-  if (before.kind == Kind::Sphere) return x + (after.a - before.a);
+  if (before.kind == Kind::Sphere || before.kind == Kind::LevelSet) return x + (after.a - before.a);
+  if (before.kind == Kind::Box) {
+    if (before.axes == after.axes) return x + (after.a - before.a);
+    return after.a + after.axes * (before.axes.transpose() * (x - before.a));
+  }
   const Vec old_axis = before.b - before.a, new_axis = after.b - after.a;
   const S old_length2 = old_axis.squaredNorm();
   if (old_axis == new_axis || old_length2 == 0 || new_axis.squaredNorm() == 0) return x + (after.a - before.a);
@@ -171,12 +291,91 @@ typename Contacts<S>::Vec Contacts<S>::carried(const Solid& before, const Solid&
   return after.a + along * new_axis + Eigen::Quaternion<S>::FromTwoVectors(old_axis, new_axis) * offset;
 }
 
+// The share of the way at which it enters a box, or infinity: first where it enters the box that holds
+// the rounded one, then by Newton's method. The distance to a convex solid is convex along a line, so that
+// Newton's steps from outside never pass the entry.
+template <class S>
+S Contacts<S>::box_entry(const Solid& solid, const Vec& from, const Vec& way) const {
+  constexpr S kNever = std::numeric_limits<S>::infinity();
+  const Vec place = solid.axes.transpose() * (from - solid.a), step = solid.axes.transpose() * way;
+  S first = 0, last = 1;
+  for (int k = 0; k < 3; ++k) {
+    const S half = solid.b[k] + solid.radius;
+    if (step[k] == 0) {
+      if (std::abs(place[k]) > half) return kNever;
+      continue;
+    }
+    const S low = (-half - place[k]) / step[k], high = (half - place[k]) / step[k];
+    first = std::max(first, std::min(low, high));
+    last = std::min(last, std::max(low, high));
+  }
+  if (first > last) return kNever;
+  if (solid.radius == 0) return first;
+  const S close = skin(solid);
+  for (int round = 0; round < 50; ++round) {
+    const Surface at = surface(solid, from + first * way);
+    if (at.gap <= close) return first;
+    const S slope = at.normal.dot(way);
+    if (!(slope < 0)) return kNever;
+    first -= at.gap / slope;
+    if (first > last) return kNever;
+  }
+  return first;
+}
+
+// … a level set, by steps of the distance, and of half a voxel where that is more.
+template <class S>
+S Contacts<S>::grid_entry(const Solid& solid, const Vec& from, const Vec& way) const {
+  constexpr S kNever = std::numeric_limits<S>::infinity();
+  const S length = way.norm();
+  if (length == 0) return kNever;
+  Vec low, high;
+  bounds(solid, low, high);
+  S first = 0, last = 1;
+  for (int k = 0; k < 3; ++k) {
+    if (way[k] == 0) {
+      if (from[k] < low[k] || from[k] > high[k]) return kNever;
+      continue;
+    }
+    const S a = (low[k] - from[k]) / way[k], b = (high[k] - from[k]) / way[k];
+    first = std::max(first, std::min(a, b));
+    last = std::min(last, std::max(a, b));
+  }
+  if (first > last) return kNever;
+  const S least = S(0.5 * solid.grid->voxel()) / length;
+  const auto outside = [&](S s) { return gap(solid, from + s * way) >= 0; };
+  S s = first;
+  bool was_outside = outside(s);
+  // A start on the surface, but for rounding, that goes in.
+  if (!was_outside && normal(solid, from + s * way).dot(way) < 0) return s;
+  while (s < last) {
+    const S next = std::min(s + std::max(clearance(solid, from + s * way, S(0)) / length, least), last);
+    const bool is_outside = outside(next);
+    if (was_outside && !is_outside) {
+      S out = s, in = next;
+      while (in - out > S(1e-3) * least) {
+        const S middle = (in + out) / 2;
+        if (!(middle > out && middle < in)) break;
+        (outside(middle) ? out : in) = middle;
+      }
+      return out;
+    }
+    was_outside = is_outside;
+    s = next;
+  }
+  return kNever;
+}
+
 // Where the way from `from` (outside) to `to` first enters the solid.
 template <class S>
 bool Contacts<S>::entry(const Solid& solid, const Vec& from, const Vec& to, Vec& hit) const {
   const Vec way = to - from;
   S first = std::numeric_limits<S>::infinity();
-  if (solid.kind == Kind::HalfSpace) {
+  if (solid.kind == Kind::Box) {
+    first = box_entry(solid, from, way);
+  } else if (solid.kind == Kind::LevelSet) {
+    first = grid_entry(solid, from, way);
+  } else if (solid.kind == Kind::HalfSpace) {
     const S start = solid.a.dot(from) - solid.radius, end = solid.a.dot(to) - solid.radius;
     if (start >= 0 && end < 0) first = start / (start - end);
   } else {
@@ -216,16 +415,18 @@ template <class S>
 void Contacts<S>::touch(Index point, const Solid& before, const Solid& after, const Vec& from, S move, S h, Vec& x,
                         Vec& v) {
   Surface at = surface(after, x);
-  if (at.gap >= 0 && (x - from).norm() + move <= at.gap) return;  // cannot have been inside on the way
+  const S clear = at.gap >= 0 && after.kind == Kind::LevelSet ? clearance(after, x, at.gap) : at.gap;
+  if (at.gap >= 0 && (x - from).norm() + move <= clear) return;  // cannot have been inside on the way
   const Vec start = carried(before, after, from);
-  const S start_gap = surface(after, start).gap;
+  const S start_gap = gap(after, start);
   // Through, or so far on that the nearest surface may be the wrong one: go by where it went in.
   Vec hit;
-  const bool far = at.gap >= 0 || (x - start).squaredNorm() > after.radius * after.radius;
-  if (start_gap >= 0 && far && after.kind != Kind::HalfSpace && entry(after, start, x, hit)) {
-    const Vec normal = surface(after, hit).normal;
-    const S beyond = (x - hit).dot(normal);
-    at = {beyond, normal};
+  const S near = nearest_is_right(after);
+  const bool far = at.gap >= 0 || (x - start).squaredNorm() > near * near;
+  if (start_gap >= -skin(after) && far && after.kind != Kind::HalfSpace && entry(after, start, x, hit)) {
+    const Vec outward = normal(after, hit);
+    const S beyond = (x - hit).dot(outward);
+    at = {beyond, outward};
   }
   if (at.gap >= 0) return;
   const Vec& n = at.normal;
@@ -278,8 +479,7 @@ void Contacts<S>::resolve(double t0, const Points<S>& from, double t1, const Val
       const Solid &before = previous_[std::size_t(candidate.solid)], &after = solids_[std::size_t(candidate.solid)];
       if (candidate.solid != last) {
         last = candidate.solid;
-        move = before.kind == Kind::HalfSpace ? std::abs(after.radius - before.radius)
-                                              : std::max((after.a - before.a).norm(), (after.b - before.b).norm());
+        move = moved(before, after);
       }
       Vec place = row(x, i), velocity = row(v, i);
       touch(i, before, after, row(from, i), move, h, place, velocity);

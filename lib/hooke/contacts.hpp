@@ -14,7 +14,9 @@ namespace hooke {
 /// through a shape within the substep is brought back to where it went in. The point is put
 /// on the surface, its normal velocity is removed (or reflected), and Coulomb friction acts
 /// on position and velocity alike, so that what sticks does not creep. A start inside is
-/// pushed out at a bounded speed. Cost: one distance a candidate and substep.
+/// pushed out at a bounded speed. What enters a box leaves by the face it came through, however
+/// thin the box is; a level set stops what is thicker than a voxel. Boxes may move and turn, level
+/// sets move. Cost: one distance a candidate and substep.
 template <class S>
 class Contacts {
  public:
@@ -37,13 +39,17 @@ class Contacts {
 
  private:
   using Vec = Eigen::Matrix<S, 3, 1>;
-  enum class Kind { HalfSpace, Sphere, Capsule };
+  using Mat = Eigen::Matrix<S, 3, 3>;
+  enum class Kind { HalfSpace, Sphere, Capsule, Box, LevelSet };
   // A shape relative to the body's origin. HalfSpace: a = normal; a sphere is a capsule with a == b.
+  // Box: a = centre, b = half extent. LevelSet: a = where the grid's zero is.
   struct Solid {
     Kind kind = Kind::Sphere;
     Vec a{0, 0, 0}, b{0, 0, 0};
-    S radius = 0;  // or the half-space's offset
+    S radius = 0;  // or the half-space's offset; of boxes and level sets the thickness alone
     S friction = 0, restitution = 0;
+    Mat axes = Mat::Identity();          // of a box: its own axes as columns
+    const DistanceGrid* grid = nullptr;  // of a level set
   };
   struct Surface {
     S gap;  // distance to the thickened surface
@@ -59,10 +65,21 @@ class Contacts {
   };
 
   void find_candidates(const Points<S>& x, const Points<S>& v, double seconds);
+  void find_box_gaps(const Solid& solid, const Points<S>& x, Index first, Index n);
+  void find_grid_gaps(const Solid& solid, const Points<S>& x, Index first, Index n, S near);
   void place_solids(double t, std::vector<Solid>& out);
+  static S moved(const Solid& before, const Solid& after);
+  static void bounds(const Solid& solid, Vec& low, Vec& high);
+  static S clearance(const Solid& solid, const Vec& x, S near);
+  static S nearest_is_right(const Solid& solid);
+  static S skin(const Solid& solid);
   Surface surface(const Solid& solid, const Vec& x) const;
+  S gap(const Solid& solid, const Vec& x) const;
+  Vec normal(const Solid& solid, const Vec& x) const;
   static Vec carried(const Solid& before, const Solid& after, const Vec& x);
   bool entry(const Solid& solid, const Vec& from, const Vec& to, Vec& hit) const;
+  S box_entry(const Solid& solid, const Vec& from, const Vec& way) const;
+  S grid_entry(const Solid& solid, const Vec& from, const Vec& way) const;
   void touch(Index point, const Solid& before, const Solid& after, const Vec& from, S move, S h, Vec& x, Vec& v);
   static S rub(const Vec& normal, S friction, Vec& relative);
 

@@ -53,6 +53,10 @@ DistanceGrid::DistanceGrid(const Vec3& lower, double voxel, const std::array<int
 
 Vec3 DistanceGrid::upper() const { return lower_ + voxel_ * Vec3(counts_[0] - 1, counts_[1] - 1, counts_[2] - 1); }
 
+double DistanceGrid::away(const Vec3& point) const {
+  return (lower_ - point).cwiseMax(point - upper()).cwiseMax(0.0).norm();
+}
+
 double DistanceGrid::distance(const Vec3& point) const {
   const Cell cell = cell_of(*this, point);
   const std::size_t row = std::size_t(counts_[0]), layer = row * std::size_t(counts_[1]);

@@ -23,8 +23,11 @@ class DistanceGrid {
   const std::array<int, 3>& counts() const { return counts_; }
   const std::vector<float>& values() const { return values_; }
 
-  /// Trilinear [m]. Outside of the grid: the nearest border value plus the way there.
+  /// Trilinear [m]. Outside of the grid: the nearest border value plus the way there, which is never less than the
+  /// distance.
   double distance(const Vec3& point) const;
+  /// How far a point is from the grid itself, 0 inside [m].
+  double away(const Vec3& point) const;
   /// The direction in which the distance grows fastest, of unit length: the outward normal. (0, 1, 0) where the
   /// distance is flat.
   Vec3 normal(const Vec3& point) const;

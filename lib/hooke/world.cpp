@@ -22,6 +22,13 @@ void World::add_collider(Collider collider) {
     throw std::invalid_argument("collider \"" + collider.name + "\": friction must not be negative");
   if (!(collider.restitution >= 0 && collider.restitution <= 1))
     throw std::invalid_argument("collider \"" + collider.name + "\": restitution must be in [0, 1]");
+  for (const Shape& shape : collider.shapes) {
+    const auto* box = std::get_if<Box>(&shape);
+    if (box && !(box->half_extent.array() > 0).all())
+      throw std::invalid_argument("collider \"" + collider.name + "\": a box's half extents must be positive");
+    const auto* set = std::get_if<LevelSet>(&shape);
+    if (set && !set->grid) throw std::invalid_argument("collider \"" + collider.name + "\": a level set needs a grid");
+  }
   colliders_.push_back(std::move(collider));
 }
 
