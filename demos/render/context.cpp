@@ -101,6 +101,9 @@ void Program::set(const char* name, std::span<const Eigen::Matrix4f> values) {
 void Program::set(const char* name, std::span<const Eigen::Vector3f> values) {
   glUniform3fv(place(name), static_cast<GLsizei>(values.size()), values.front().data());
 }
+void Program::set(const char* name, std::span<const Eigen::Vector4f> values) {
+  glUniform4fv(place(name), static_cast<GLsizei>(values.size()), values.front().data());
+}
 void Program::set_texture(const char* name, int unit, GLenum target, GLuint texture) {
   glActiveTexture(GL_TEXTURE0 + static_cast<GLenum>(unit));
   glBindTexture(target, texture);

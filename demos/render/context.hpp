@@ -47,6 +47,7 @@ void check(const char* where);
 class Program {
  public:
   Program() = default;
+  explicit operator bool() const { return id_ != 0; }
   /// `name` appears in the error text if a shader does not compile.
   Program(const char* name, const std::string& vertex_source, const std::string& fragment_source);
 
@@ -59,6 +60,7 @@ class Program {
   void set(const char* name, const Eigen::Matrix4f& value);
   void set(const char* name, std::span<const Eigen::Matrix4f> values);
   void set(const char* name, std::span<const Eigen::Vector3f> values);
+  void set(const char* name, std::span<const Eigen::Vector4f> values);
   /// Binds a texture to a unit and the sampler of that name to the unit.
   void set_texture(const char* name, int unit, GLenum target, GLuint texture);
 

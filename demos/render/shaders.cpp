@@ -251,10 +251,15 @@ centroid in vec2 cloth_place;
 centroid in float side;
 centroid in float hem;
 uniform sampler2D visible;
+#if !METAL
 uniform vec3 key_direction, rim_direction, key_color, rim_color, sky_color, ground_color;
 uniform vec3 floor_color;
+#endif
 uniform vec3 outside_color, inside_color, sheen_color;
 uniform float roughness, weave;
+#if STONE
+uniform float wetness;
+#endif
 uniform int two_sided;
 out vec4 light;
 
@@ -341,6 +346,48 @@ vec3 lit_by(Surface s, vec3 n, vec3 v, vec3 l, vec3 color, float seen) {
   return back * color * nl * seen;
 }
 
+#if LAMPS
+uniform int lamps;
+uniform vec4 lamp_place[LAMPS];  // and how far its sparks spread, squared
+uniform vec3 lamp_power[LAMPS];
+vec3 lamp_light(vec3 n) {
+  vec3 sum = vec3(0);
+  for (int i = 0; i < lamps; ++i) {
+    vec3 d = lamp_place[i].xyz - place;
+    float d2 = dot(d, d) + lamp_place[i].w;
+    sum += lamp_power[i] * (max(0.0, dot(n, d)) * inversesqrt(d2) / d2);
+  }
+  return sum;
+}
+#if STONE || METAL
+vec3 lamp_gloss(vec3 n, vec3 v, float a) {
+  vec3 sum = vec3(0);
+  for (int i = 0; i < lamps; ++i) {
+    vec3 d = lamp_place[i].xyz - place;
+    float d2 = dot(d, d) + lamp_place[i].w;
+    vec3 l = d * inversesqrt(d2), h = normalize(l + v);
+    float wide = min(1.0, a + 0.5 * sqrt(lamp_place[i].w / d2));  // a lamp as wide as its sparks
+    sum += lamp_power[i] / d2 * max(0.0, dot(n, l)) * 0.25 * ggx(clamp(dot(n, h), 0.0, 1.0), wide);
+  }
+  return sum;
+}
+#endif
+#endif
+
+#if STONE
+float grain_hash(vec3 c) {
+  c = fract(c * 0.1031);
+  c += dot(c, c.zyx + 31.32);
+  return fract((c.x + c.y) * c.z);
+}
+float grain(vec3 c) {
+  vec3 i = floor(c), f = fract(c);
+  f = f * f * (3.0 - 2.0 * f);
+  return mix(mix(mix(grain_hash(i), grain_hash(i + vec3(1, 0, 0)), f.x), mix(grain_hash(i + vec3(0, 1, 0)), grain_hash(i + vec3(1, 1, 0)), f.x), f.y),
+             mix(mix(grain_hash(i + vec3(0, 0, 1)), grain_hash(i + vec3(1, 0, 1)), f.x), mix(grain_hash(i + vec3(0, 1, 1)), grain_hash(i + vec3(1, 1, 1)), f.x), f.y), f.z);
+}
+#endif
+
 vec3 floor_light(vec4 seen) {
   // The lamps light a pool around the subject that fades towards the background.
   float t = cloth_place.x;  // along the floor's profile
@@ -353,11 +400,20 @@ vec3 floor_light(vec4 seen) {
 void main() {
   vec3 n = normalize(facing), v = normalize(eye - place);
 #if FLOOR
+#if LAMPS
+  vec4 floor_seen = visibility(n);
+  light = vec4(floor_light(floor_seen) + floor_color * lamp_light(n) * mix(0.4, 1.0, floor_seen.z), 1);
+#else
   light = vec4(floor_light(visibility(n)), 1);
+#endif
 #else
   bool back_face = two_sided == 1 && !gl_FrontFacing;
   if (back_face) n = -n;
+#if STONE
+  bool inside = back_face;
+#else
   bool inside = back_face || side > 0.75;
+#endif
   vec4 seen = visibility(n);
   Surface s = Surface(inside ? inside_color : outside_color, sheen_color * (inside ? 0.8 : 1.0), roughness);
 #if CLOTH
@@ -380,7 +436,47 @@ void main() {
     }
   }
 #endif
+#if STONE
+  // Layers, blotches and grains, in the place where the stone stands. What a pixel cannot
+  // resolve fades to its mean.
+  float footprint = 2.0 * dot(place - eye, forward) * length(ray_up) / picture.y;
+  vec3 dry_n = n;
+  float blotch = 0.6 * grain(place * 7.0) + 0.4 * grain(place * 19.0) - 0.5;
+  float layer = grain(vec3(place.x * 2.0, place.y * 34.0 + 3.0 * blotch, place.z * 2.0)) - 0.5;
+  float coarse = resolved(90.0 * footprint), fine = resolved(420.0 * footprint);
+  vec3 e = vec3(0.004, 0, 0);
+  float g0 = grain(place * 90.0);
+  vec3 slope = vec3(grain((place + e.xyy) * 90.0), grain((place + e.yxy) * 90.0), grain((place + e.yyx) * 90.0)) - g0;
+  float speck = grain(place * 420.0);
+  float wet = clamp(wetness * side, 0.0, 1.0);
+  s.color *= 1.0 + 0.42 * blotch + 0.22 * layer + 0.30 * (g0 - 0.5) * coarse + 0.5 * (speck - 0.5) * fine;
+  s.color = mix(s.color, s.color * vec3(1.12, 0.98, 0.84), clamp(blotch * 1.5, 0.0, 1.0));
+  slope -= n * dot(slope, n);
+  n = normalize(n - slope * (0.55 * coarse * (1.0 - 0.7 * wet)));
+  s.color *= mix(1.0, 0.50, wet);
+  s.rough = mix(s.rough, 0.16, wet);
+#endif
   float nv = clamp(dot(n, v), 0.0, 1.0);
+#if METAL
+  // Brushed around the vertical: fine scratches spread what it mirrors across them.
+  vec3 scratch = cross(n, abs(n.y) < 0.97 ? vec3(0, 1, 0) : vec3(1, 0, 0));
+  scratch = normalize(scratch);
+  vec3 across = cross(n, scratch);
+  float line = noise(vec2(dot(place, across) * 900.0, dot(place, scratch) * 14.0)) - 0.5;
+  line *= resolved(900.0 * 2.0 * dot(place - eye, forward) * length(ray_up) / picture.y);
+  n = normalize(n + across * 0.10 * line);
+  vec3 mirror = vec3(0);
+  for (int i = -3; i <= 3; ++i) {
+    vec3 m = normalize(n + across * (0.16 * s.rough * float(i)));
+    mirror += (4.0 - abs(float(i))) / 16.0 * mirrored(reflect(-v, m), 0.10 + 0.5 * s.rough);
+  }
+  vec3 shine = s.color + (1.0 - s.color) * pow(1.0 - nv, 5.0);
+  vec3 result = shine * mirror * mix(0.35, 1.0, 0.5 * (seen.x + seen.z)) * (1.0 + 0.25 * line);
+#if LAMPS
+  result += shine * (2.0 * lamp_gloss(n, v, 0.5 * s.rough + 0.08) + 0.15 * lamp_light(n));
+#endif
+  light = vec4(result, 1);
+#else
   vec3 result = lit_by(s, n, v, key_direction, key_color, seen.x) + lit_by(s, n, v, rim_direction, rim_color, seen.y);
   float up = 0.5 + 0.5 * n.y;
   vec3 around = sky_color * up * seen.z + ground_color * floor_color * (1.0 - up) * seen.w;
@@ -390,7 +486,19 @@ void main() {
 #else
   result += around * 0.5 * (0.04 + 0.5 * pow(1.0 - nv, 5.0) * (1.0 - s.rough * 0.6));
 #endif
+#if STONE
+  // A film of water mirrors the light from above.
+  float film = wet * (0.02 + 0.98 * pow(1.0 - clamp(dot(dry_n, v), 0.0, 1.0), 5.0));
+  result = mix(result, around * 1.3 / max(up, 0.3), film * 0.8);
+#endif
+#if LAMPS
+  result += s.color * lamp_light(n) * mix(0.5, 1.0, seen.z);
+#if STONE
+  result += 0.04 * lamp_gloss(n, v, s.rough * s.rough);
+#endif
+#endif
   light = vec4(result, 1);
+#endif
 #endif
 })";
 
@@ -400,6 +508,13 @@ const char* const kDevelop = R"(
 uniform sampler2DMS picture_light;
 uniform int supersample, samples;
 uniform float exposure;
+#if VEIL
+uniform sampler2D veil;
+#endif
+#if GLOW
+uniform sampler2D glow, bloom;
+uniform float bloom_share;
+#endif
 out vec4 finished;
 vec3 film(vec3 c) {
   c = mat3(0.59719, 0.07600, 0.02840, 0.35458, 0.90834, 0.13383, 0.04823, 0.01566, 0.83777) * c;
@@ -416,10 +531,29 @@ void main() {
   vec2 at = gl_FragCoord.xy * float(supersample) / vec2(textureSize(picture_light)) * 2.0 - 1.0;
   float vignette = 1.0 - 0.20 * smoothstep(0.35, 2.1, dot(at, at));
   vec3 sum = vec3(0);
+#if VEIL || GLOW
+  for (int y = 0; y < supersample; ++y)
+    for (int x = 0; x < supersample; ++x) {
+      ivec2 at_sample = pixel * supersample + ivec2(x, y);
+      vec4 over = vec4(0, 0, 0, 1);
+#if VEIL
+      over = texelFetch(veil, at_sample, 0);
+#endif
+#if GLOW
+      vec2 share = (vec2(at_sample) + 0.5) / vec2(textureSize(picture_light));
+      over.rgb += (1.0 - bloom_share) * texelFetch(glow, at_sample, 0).rgb + texture(bloom, share).rgb;
+#endif
+      for (int s = 0; s < samples; ++s) {
+        vec3 light = texelFetch(picture_light, at_sample, s).rgb * over.a + over.rgb;
+        sum += clamp(film(exposure * vignette * min(light, 1e4)), 0.0, 1.0);
+      }
+    }
+#else
   for (int y = 0; y < supersample; ++y)
     for (int x = 0; x < supersample; ++x)
       for (int s = 0; s < samples; ++s)
         sum += clamp(film(exposure * vignette * texelFetch(picture_light, pixel * supersample + ivec2(x, y), s).rgb), 0.0, 1.0);
+#endif
   vec3 c = 0.006 + 0.986 * sum / float(supersample * supersample * samples);
   c = mix(12.92 * c, 1.055 * pow(c, vec3(1.0 / 2.4)) - 0.055, step(0.0031308, c));
   float dither = hash(gl_FragCoord.xy) + hash(gl_FragCoord.xy + 71.7) - 1.0;
@@ -441,12 +575,19 @@ std::string prepass_fragment_shader() { return std::string(kVersion) + kPrepass;
 std::string full_screen_vertex_shader() { return std::string(kVersion) + kFullScreenVertex; }
 std::string visibility_fragment_shader() { return kVersion + dome_size() + kPlaceOfPixel + kVisibility; }
 std::string blur_fragment_shader() { return std::string(kVersion) + kPlaceOfPixel + kBlur; }
-std::string lit_fragment_shader(Shade shade) {
-  const char* const choice = shade == Shade::Floor   ? "#define FLOOR 1\n#define CLOTH 0\n"
-                             : shade == Shade::Matte ? "#define FLOOR 0\n#define CLOTH 0\n"
-                                                     : "#define FLOOR 0\n#define CLOTH 1\n";
-  return std::string(kVersion) + choice + kPlaceOfPixel + kLit;
+std::string lit_fragment_shader(Shade shade, bool lamps) {
+  std::string choice;
+  for (const auto& [name, which] :
+       {std::pair{"FLOOR", Shade::Floor}, {"CLOTH", Shade::Cloth}, {"STONE", Shade::Stone}, {"METAL", Shade::Metal}})
+    choice += std::string("#define ") + name + (shade == which ? " 1\n" : " 0\n");
+  choice += "#define LAMPS " + std::to_string(lamps ? kMostLamps : 0) + "\n";
+  if (shade == Shade::Metal) return kVersion + choice + kPlaceOfPixel + studio_functions() + kLit;
+  return kVersion + choice + kPlaceOfPixel + kLit;
 }
-std::string develop_fragment_shader() { return std::string(kVersion) + kDevelop; }
+std::string develop_fragment_shader(bool veil, bool glow) {
+  return kVersion + std::string("#define VEIL ") + (veil ? "1" : "0") + "\n#define GLOW " + (glow ? "1" : "0") + "\n" +
+         kDevelop;
+}
+std::string place_of_pixel() { return kPlaceOfPixel; }
 
 }  // namespace hooke::render

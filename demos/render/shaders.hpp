@@ -11,7 +11,9 @@ inline constexpr int kDomeUpward = 20;      ///< of these, the first so many shi
 inline constexpr int kDomeColumns = 7;      ///< tiles side by side in the dome's depth map
 
 /// What the lit pass is compiled for.
-enum class Shade { Floor, Matte, Cloth };
+enum class Shade { Floor, Matte, Cloth, Stone, Metal };
+inline constexpr int kShades = 5;
+inline constexpr int kMostLamps = 16;  ///< small lights that stand for sparks
 
 std::string depth_vertex_shader();
 std::string depth_fragment_shader();
@@ -21,7 +23,23 @@ std::string prepass_fragment_shader();
 std::string full_screen_vertex_shader();
 std::string visibility_fragment_shader();
 std::string blur_fragment_shader();
-std::string lit_fragment_shader(Shade shade);
-std::string develop_fragment_shader();
+/// `lamps`: with the light of sparks.
+std::string lit_fragment_shader(Shade shade, bool lamps);
+/// `veil`, `glow`: with smoke and drops, with sparks over the solid picture.
+std::string develop_fragment_shader(bool veil, bool glow);
+
+/// GLSL functions: where the surface under a pixel is; what a mirror shows of the studio.
+std::string place_of_pixel();
+std::string studio_functions();
+
+std::string streak_vertex_shader();
+std::string streak_fragment_shader();
+std::string sprite_vertex_shader();
+std::string puff_fragment_shader();
+std::string drop_fragment_shader();
+std::string narrow_fragment_shader();
+std::string widen_fragment_shader();
+std::string resolve_fragment_shader();
+std::string water_fragment_shader();
 
 }  // namespace hooke::render

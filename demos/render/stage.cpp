@@ -3,19 +3,25 @@
 //      dome that stands for light from all around;
 //   2. a prepass, one sample a pixel: how far each pixel is and how it faces;
 //   3. visibility: from 1 and 2, how much of each light every pixel sees; then a blur;
-//   4. the lit picture, four samples a pixel, in linear light;
-//   5. development: tone curve, averaging, vignette and dither, down to 8 bits.
+//   4. the lit picture, four samples a pixel, in linear light, with the sparks as lamps;
+//   5. water, which bends and mirrors the picture so far;
+//   6. layers of one sample a pixel over it: smoke and drops; sparks and their bloom;
+//   7. development: tone curve, averaging, vignette and dither, down to 8 bits.
+// Passes that a picture has no use for are left out.
 // Nothing is random and nothing is kept between pictures except uploaded connectivity.
 #include <render/stage.hpp>
 
 #include <render/caption.hpp>
 #include <render/context.hpp>
+#include <render/effects.hpp>
+#include <render/frame.hpp>
 #include <render/shaders.hpp>
 #include <render/surface.hpp>
 
 #include <Eigen/Geometry>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <numbers>
 #include <optional>
@@ -84,11 +90,6 @@ std::vector<Vec3> dome_directions() {
   return directions;
 }
 
-struct View {
-  Vec3 forward, ray_right, ray_up;
-  Matrix4f to_clip;
-};
-
 View view_of(const Camera& camera, double aspect, double far_away) {
   const double fov = camera.vertical_fov_degrees;
   if (!(fov > 0 && fov < 180))
@@ -104,6 +105,7 @@ View view_of(const Camera& camera, double aspect, double far_away) {
   view.ray_up = up * tan_v;
 
   const double near = std::clamp(0.02 * sight.norm(), 0.005, 0.1), far = far_away;
+  view.near = near;
   Eigen::Matrix4d look = Eigen::Matrix4d::Identity(), lens = Eigen::Matrix4d::Zero();
   look.row(0) << right.transpose(), -right.dot(camera.eye);
   look.row(1) << up.transpose(), -up.dot(camera.eye);
@@ -149,6 +151,8 @@ struct Uploaded {
                    GL_STATIC_DRAW);
     }
     surface->update(model.mesh->vertices);
+    if (model.material.kind == Material::Kind::Water) surface->set_cover(model.cover, 0);
+    if (model.material.kind == Material::Kind::Stone) surface->set_cover(model.cover, 1);
     const auto& list = surface->vertices();
     glBindBuffer(GL_ARRAY_BUFFER, vertices);
     glBufferData(GL_ARRAY_BUFFER, static_cast<GLsizeiptr>(list.size() * sizeof list[0]), list.data(), GL_STREAM_DRAW);
@@ -171,6 +175,10 @@ void require_drawable(const Model& model) {
     throw std::invalid_argument("roughness must be in (0, 1], got " + std::to_string(m.roughness));
   if (!(m.weave >= 0) || !(model.thickness >= 0) || !std::isfinite(m.weave) || !std::isfinite(model.thickness))
     throw std::invalid_argument("weave and thickness must not be negative");
+  if (!(m.wetness >= 0 && m.wetness <= 1))
+    throw std::invalid_argument("wetness must be in [0, 1], got " + std::to_string(m.wetness));
+  if (model.thickness > 0 && (m.kind == Material::Kind::Water || m.kind == Material::Kind::Stone))
+    throw std::invalid_argument("water and stone must have no thickness");
   if (model.subdivisions < 0 || model.subdivisions > 2)
     throw std::invalid_argument("subdivisions must be 0 to 2, got " + std::to_string(model.subdivisions));
 }
@@ -179,6 +187,29 @@ void require_look(const Look& look) {
   if (!look.key_direction.allFinite() || !look.rim_direction.allFinite() || look.key_direction.norm() < 1e-9 ||
       look.rim_direction.norm() < 1e-9 || !(look.key_size >= 0 && look.key_size < 2))
     throw std::invalid_argument("Stage: light directions must be finite and not zero, key_size in [0, 2)");
+  if (!(look.bloom >= 0 && look.bloom <= 1))
+    throw std::invalid_argument("Stage: bloom must be in [0, 1], got " + std::to_string(look.bloom));
+}
+
+bool is_water(const Model& model) { return model.material.kind == Material::Kind::Water; }
+
+bool any_of_kind(std::span<const Particles> particles, bool sparks) {
+  return std::any_of(particles.begin(), particles.end(), [&](const Particles& p) {
+    return (p.kind == Particles::Kind::Sparks) == sparks && p.positions->rows() > 0;
+  });
+}
+
+Shade shade_of(Material::Kind kind) {
+  switch (kind) {
+    case Material::Kind::Cloth:
+      return Shade::Cloth;
+    case Material::Kind::Stone:
+      return Shade::Stone;
+    case Material::Kind::Metal:
+      return Shade::Metal;
+    default:
+      return Shade::Matte;
+  }
 }
 
 }  // namespace
@@ -193,6 +224,80 @@ Look look_for(const Camera& camera) {
   return look;
 }
 
+Look workshop_for(const Camera& camera) {
+  Look look = look_for(camera);
+  look.key_intensity = 0.10;
+  look.rim_intensity = 0.16;
+  look.fill_intensity = 0.07;
+  look.floor_color = {0.20, 0.195, 0.19};
+  return look;
+}
+
+Material water() {
+  Material material;
+  material.kind = Material::Kind::Water;
+  material.color = {0.72, 0.90, 0.92};
+  material.roughness = 0.05;
+  return material;
+}
+
+Material sandstone() {
+  Material material;
+  material.kind = Material::Kind::Stone;
+  material.color = material.inside_color = {0.46, 0.39, 0.30};
+  material.roughness = 0.85;
+  return material;
+}
+
+Material steel() {
+  Material material;
+  material.kind = Material::Kind::Metal;
+  material.color = material.inside_color = {0.56, 0.55, 0.53};
+  material.roughness = 0.4;
+  return material;
+}
+
+Lights lights_of(const Look& look) {
+  return {look.key_intensity * Vec3(2.05, 1.90, 1.68), look.rim_intensity * Vec3(1.35, 1.68, 2.15),
+          look.fill_intensity * Vec3(0.40, 0.44, 0.50), look.fill_intensity * Vec3(0.95, 0.90, 0.85)};
+}
+
+void set_pixels(gl::Program& program, const Frame& frame) {
+  program.set("eye", frame.camera.eye);
+  program.set("forward", frame.view.forward);
+  program.set("ray_right", frame.view.ray_right);
+  program.set("ray_up", frame.view.ray_up);
+  program.set("picture", Eigen::Vector2f(static_cast<float>(frame.width), static_cast<float>(frame.height)));
+  program.set_texture("normal_depth", 0, GL_TEXTURE_2D, frame.normal_depth);
+}
+
+void set_lights(gl::Program& program, const Look& look) {
+  const Lights lights = lights_of(look);
+  program.set("key_direction", Vec3(look.key_direction.normalized()));
+  program.set("rim_direction", Vec3(look.rim_direction.normalized()));
+  program.set("key_color", lights.key);
+  program.set("rim_color", lights.rim);
+  program.set("sky_color", lights.sky);
+  program.set("ground_color", lights.ground);
+  program.set("floor_color", look.floor_color);
+  program.set("key_size", look.key_size);
+}
+
+void set_lamps(gl::Program& program, const std::vector<Lamp>& lamps) {
+  constexpr double least_size = 0.02;  // [m] no spark makes a point of light on what it touches
+  std::vector<Eigen::Vector4f> places;
+  std::vector<Vector3f> powers;
+  for (const Lamp& lamp : lamps) {
+    const Vector3f at = lamp.place.cast<float>();
+    places.emplace_back(at.x(), at.y(), at.z(), static_cast<float>(lamp.size * lamp.size + least_size * least_size));
+    powers.push_back(lamp.power.cast<float>());
+  }
+  program.set("lamps", static_cast<int>(lamps.size()));
+  if (lamps.empty()) return;
+  program.set("lamp_place", std::span<const Eigen::Vector4f>(places));
+  program.set("lamp_power", std::span<const Vector3f>(powers));
+}
+
 struct Stage::Studio {
   Studio(int width_, int height_, int supersample_, const Look& look_);
   void make_floor();
@@ -200,17 +305,25 @@ struct Stage::Studio {
   Box upload(std::span<const Model> models);
   void draw_depth_maps(std::span<const Model> models, const Box& box);
   void draw_floor(gl::Program& program, const View& view);
-  void draw_prepass(std::span<const Model> models, const Camera& camera, const View& view);
-  void draw_visibility(const Camera& camera, const View& view, const Box& box);
-  void draw_lit(std::span<const Model> models, const Camera& camera, const View& view);
-  Image develop();
-  void set_pixels(gl::Program& program, const Camera& camera, const View& view);
-  Image draw(std::span<const Model> models, const Camera& camera);
+  void draw_prepass(std::span<const Model> models, const Frame& frame, bool water);
+  void draw_visibility(const Frame& frame, const Box& box);
+  gl::Program& lit(Shade shade, bool lamps);
+  void draw_lit(std::span<const Model> models, const Frame& frame);
+  GLuint resolve();
+  void draw_water(std::span<const Model> models, const Frame& frame);
+  Image develop(bool veil, bool glow);
+  Image draw(std::span<const Model> models, std::span<const Particles> particles, const Camera& camera);
 
   int width, height, supersample;
   Look look;
   gl::Context context;
-  gl::Program depth, prepass, floor_prepass, visibility, blur, lit_floor, lit_matte, lit_cloth, developer;
+  gl::Program depth, prepass, floor_prepass, visibility, blur;
+  // Compiled when first needed.
+  std::array<std::array<gl::Program, 2>, kShades> lit_programs;
+  std::array<gl::Program, 4> developers;
+  gl::Program resolver, water;
+  std::optional<Effects> effects;
+  GLuint scene = 0, scene_target = 0;
   GLuint empty_array = 0, floor_array = 0;
   GLsizei floor_count = 0;
   GLuint key_map = 0, rim_map = 0, dome_map = 0, key_target = 0, rim_target = 0, dome_target = 0;
@@ -238,10 +351,6 @@ Stage::Studio::Studio(int width_, int height_, int supersample_, const Look& loo
   floor_prepass = gl::Program("floor prepass", floor_vertex_shader(), prepass_fragment_shader());
   visibility = gl::Program("visibility", full_screen_vertex_shader(), visibility_fragment_shader());
   blur = gl::Program("blur", full_screen_vertex_shader(), blur_fragment_shader());
-  lit_floor = gl::Program("lit floor", floor_vertex_shader(), lit_fragment_shader(Shade::Floor));
-  lit_matte = gl::Program("lit matte", surface_vertex_shader(), lit_fragment_shader(Shade::Matte));
-  lit_cloth = gl::Program("lit cloth", surface_vertex_shader(), lit_fragment_shader(Shade::Cloth));
-  developer = gl::Program("develop", full_screen_vertex_shader(), develop_fragment_shader());
   make_floor();
   make_targets();
   gl::check("the studio's construction");
@@ -333,7 +442,8 @@ Box Stage::Studio::upload(std::span<const Model> models) {
 void Stage::Studio::draw_depth_maps(std::span<const Model> models, const Box& box) {
   const auto draw_into = [&](const Matrix4f& to_clip, Surface::Range (Surface::*range)() const) {
     depth.set("to_clip", to_clip);
-    for (std::size_t i = 0; i < models.size(); ++i) uploaded[i].draw((*uploaded[i].surface.*range)());
+    for (std::size_t i = 0; i < models.size(); ++i)
+      if (!is_water(models[i])) uploaded[i].draw((*uploaded[i].surface.*range)());
   };
   depth.use();
   const Vec3 key_direction = look.key_direction.normalized(), rim_direction = look.rim_direction.normalized();
@@ -369,41 +479,35 @@ void Stage::Studio::draw_floor(gl::Program& program, const View& view) {
   glDrawElements(GL_TRIANGLES, floor_count, GL_UNSIGNED_INT, nullptr);
 }
 
-void Stage::Studio::draw_prepass(std::span<const Model> models, const Camera& camera, const View& view) {
+// The solid models and the floor; or the water, over what is there.
+void Stage::Studio::draw_prepass(std::span<const Model> models, const Frame& frame, bool wet) {
   glBindFramebuffer(GL_FRAMEBUFFER, prepass_target);
   glViewport(0, 0, drawn_width(), drawn_height());
-  glClear(GL_DEPTH_BUFFER_BIT | GL_COLOR_BUFFER_BIT);
+  if (!wet) glClear(GL_DEPTH_BUFFER_BIT | GL_COLOR_BUFFER_BIT);
   for (gl::Program* program : {&prepass, &floor_prepass}) {
     program->use();
-    program->set("eye", camera.eye);
-    program->set("forward", view.forward);
-    program->set("to_clip", view.to_clip);
+    program->set("eye", frame.camera.eye);
+    program->set("forward", frame.view.forward);
+    program->set("to_clip", frame.view.to_clip);
     program->set("two_sided", 0);
   }
   prepass.use();
   for (std::size_t i = 0; i < models.size(); ++i) {
+    if (is_water(models[i]) != wet) continue;
     prepass.set("two_sided", models[i].thickness > 0 ? 0 : 1);
     uploaded[i].draw(uploaded[i].surface->all());
   }
+  if (wet) return;
   floor_prepass.use();
-  draw_floor(floor_prepass, view);
+  draw_floor(floor_prepass, frame.view);
 }
 
-void Stage::Studio::set_pixels(gl::Program& program, const Camera& camera, const View& view) {
-  program.set("eye", camera.eye);
-  program.set("forward", view.forward);
-  program.set("ray_right", view.ray_right);
-  program.set("ray_up", view.ray_up);
-  program.set("picture", Eigen::Vector2f(static_cast<float>(drawn_width()), static_cast<float>(drawn_height())));
-  program.set_texture("normal_depth", 0, GL_TEXTURE_2D, normal_depth);
-}
-
-void Stage::Studio::draw_visibility(const Camera& camera, const View& view, const Box& box) {
+void Stage::Studio::draw_visibility(const Frame& frame, const Box& box) {
   glBindVertexArray(empty_array);
   glDisable(GL_DEPTH_TEST);
   glBindFramebuffer(GL_FRAMEBUFFER, visible_target[0]);
   visibility.use();
-  set_pixels(visibility, camera, view);
+  set_pixels(visibility, frame);
   visibility.set_texture("key_depth", 1, GL_TEXTURE_2D, key_map);
   visibility.set_texture("rim_shadow", 2, GL_TEXTURE_2D, rim_map);
   visibility.set_texture("dome_shadow", 3, GL_TEXTURE_2D, dome_map);
@@ -426,7 +530,7 @@ void Stage::Studio::draw_visibility(const Camera& camera, const View& view, cons
   for (const GLuint unit : {2u, 3u}) glBindSampler(unit, 0);
 
   blur.use();
-  set_pixels(blur, camera, view);
+  set_pixels(blur, frame);
   for (int k = 0; k < 2; ++k) {
     glBindFramebuffer(GL_FRAMEBUFFER, visible_target[1 - k]);
     blur.set_texture("visible", 1, GL_TEXTURE_2D, visible[k]);
@@ -436,39 +540,81 @@ void Stage::Studio::draw_visibility(const Camera& camera, const View& view, cons
   glEnable(GL_DEPTH_TEST);
 }
 
-void Stage::Studio::draw_lit(std::span<const Model> models, const Camera& camera, const View& view) {
+gl::Program& Stage::Studio::lit(Shade shade, bool lamps) {
+  gl::Program& program = lit_programs[static_cast<std::size_t>(shade)][lamps];
+  if (!program)
+    program = gl::Program("lit", shade == Shade::Floor ? floor_vertex_shader() : surface_vertex_shader(),
+                          lit_fragment_shader(shade, lamps));
+  return program;
+}
+
+void Stage::Studio::draw_lit(std::span<const Model> models, const Frame& frame) {
   glBindFramebuffer(GL_FRAMEBUFFER, light_target);
   glClear(GL_DEPTH_BUFFER_BIT | GL_COLOR_BUFFER_BIT);
-  for (gl::Program* program : {&lit_floor, &lit_matte, &lit_cloth}) {
-    program->use();
-    set_pixels(*program, camera, view);
-    program->set_texture("visible", 1, GL_TEXTURE_2D, visible[0]);
-    program->set("to_clip", view.to_clip);
-    program->set("key_direction", Vec3(look.key_direction.normalized()));
-    program->set("rim_direction", Vec3(look.rim_direction.normalized()));
-    program->set("key_color", Vec3(look.key_intensity * Vec3(2.05, 1.90, 1.68)));
-    program->set("rim_color", Vec3(look.rim_intensity * Vec3(1.35, 1.68, 2.15)));
-    program->set("sky_color", Vec3(look.fill_intensity * Vec3(0.40, 0.44, 0.50)));
-    program->set("ground_color", Vec3(look.fill_intensity * Vec3(0.95, 0.90, 0.85)));
-    program->set("floor_color", look.floor_color);
-  }
-  for (std::size_t i = 0; i < models.size(); ++i) {
-    const Material& m = models[i].material;
-    gl::Program& program = m.kind == Material::Kind::Cloth ? lit_cloth : lit_matte;
+  const auto prepare = [&](Shade shade) -> gl::Program& {
+    gl::Program& program = lit(shade, !frame.lamps.empty());
     program.use();
+    set_pixels(program, frame);
+    program.set_texture("visible", 1, GL_TEXTURE_2D, visible[0]);
+    program.set("to_clip", frame.view.to_clip);
+    set_lights(program, frame.look);
+    set_lamps(program, frame.lamps);
+    return program;
+  };
+  for (std::size_t i = 0; i < models.size(); ++i) {
+    if (is_water(models[i])) continue;
+    const Material& m = models[i].material;
+    gl::Program& program = prepare(shade_of(m.kind));
     program.set("two_sided", models[i].thickness > 0 ? 0 : 1);
     program.set("outside_color", m.color);
     program.set("inside_color", m.inside_color);
     program.set("sheen_color", m.sheen);
     program.set("roughness", m.roughness);
     program.set("weave", models[i].uv ? m.weave : 0.0);
+    program.set("wetness", m.wetness);
     uploaded[i].draw(uploaded[i].surface->all());
   }
-  lit_floor.use();
-  draw_floor(lit_floor, view);
+  draw_floor(prepare(Shade::Floor), frame.view);
 }
 
-Image Stage::Studio::develop() {
+// The picture so far, one sample a pixel.
+GLuint Stage::Studio::resolve() {
+  if (!resolver) {
+    resolver = gl::Program("resolve", full_screen_vertex_shader(), resolve_fragment_shader());
+    scene = gl::make_texture(GL_RGBA16F, drawn_width(), drawn_height(), GL_LINEAR);
+    scene_target = gl::make_framebuffer(GL_TEXTURE_2D, scene, 0);
+  }
+  glBindVertexArray(empty_array);
+  glDisable(GL_DEPTH_TEST);
+  glBindFramebuffer(GL_FRAMEBUFFER, scene_target);
+  resolver.use();
+  resolver.set_texture("picture_light", 1, GL_TEXTURE_2D_MULTISAMPLE, light);
+  resolver.set("samples", kSamples);
+  glDrawArrays(GL_TRIANGLES, 0, 3);
+  glEnable(GL_DEPTH_TEST);
+  return scene;
+}
+
+void Stage::Studio::draw_water(std::span<const Model> models, const Frame& frame) {
+  resolve();
+  if (!water) water = gl::Program("water", surface_vertex_shader(), water_fragment_shader());
+  glBindFramebuffer(GL_FRAMEBUFFER, light_target);
+  water.use();
+  set_pixels(water, frame);
+  set_lights(water, frame.look);
+  water.set_texture("scene", 1, GL_TEXTURE_2D, scene);
+  water.set("to_clip", frame.view.to_clip);
+  for (std::size_t i = 0; i < models.size(); ++i) {
+    if (!is_water(models[i])) continue;
+    water.set("outside_color", models[i].material.color);
+    water.set("roughness", models[i].material.roughness);
+    uploaded[i].draw(uploaded[i].surface->all());
+  }
+}
+
+Image Stage::Studio::develop(bool veil, bool glow) {
+  gl::Program& developer = developers[(veil ? 1u : 0u) + (glow ? 2u : 0u)];
+  if (!developer) developer = gl::Program("develop", full_screen_vertex_shader(), develop_fragment_shader(veil, glow));
   glBindVertexArray(empty_array);
   glDisable(GL_DEPTH_TEST);
   glBindFramebuffer(GL_FRAMEBUFFER, finished_target);
@@ -478,6 +624,12 @@ Image Stage::Studio::develop() {
   developer.set("supersample", supersample);
   developer.set("samples", kSamples);
   developer.set("exposure", look.exposure);
+  if (veil) developer.set_texture("veil", 1, GL_TEXTURE_2D, effects->veil());
+  if (glow) {
+    developer.set_texture("glow", 2, GL_TEXTURE_2D, effects->glow());
+    developer.set_texture("bloom", 3, GL_TEXTURE_2D, effects->bloom());
+    developer.set("bloom_share", look.bloom);
+  }
   glDrawArrays(GL_TRIANGLES, 0, 3);
   glEnable(GL_DEPTH_TEST);
 
@@ -491,7 +643,14 @@ Image Stage::Studio::develop() {
   return image;
 }
 
-Image Stage::Studio::draw(std::span<const Model> models, const Camera& camera) {
+Image Stage::Studio::draw(std::span<const Model> models, std::span<const Particles> particles, const Camera& camera) {
+  for (std::size_t i = 0; i < particles.size(); ++i) {
+    try {
+      require_drawable(particles[i]);
+    } catch (const std::invalid_argument& error) {
+      throw std::invalid_argument("Stage: particles " + std::to_string(i) + ": " + error.what());
+    }
+  }
   const gl::Context::Current current(context);
   glEnable(GL_DEPTH_TEST);
   glEnable(GL_MULTISAMPLE);
@@ -499,14 +658,28 @@ Image Stage::Studio::draw(std::span<const Model> models, const Camera& camera) {
   floor_center = Vec3(camera.target.x(), 0, camera.target.z());
   const Vec3 away = camera.eye - floor_center;
   floor_radius = std::max(6.0, 1.2 * std::hypot(away.x(), away.z()));
-  const View view = view_of(camera, static_cast<double>(width) / height, 12 * floor_radius + away.norm());
+  const Frame frame{
+      camera,         view_of(camera, static_cast<double>(width) / height, 12 * floor_radius + away.norm()),
+      look,           drawn_width(),
+      drawn_height(), supersample,
+      normal_depth,   lamps_of(particles, kMostLamps)};
 
   const Box box = upload(models);
   draw_depth_maps(models, box);
-  draw_prepass(models, camera, view);
-  draw_visibility(camera, view, box);
-  draw_lit(models, camera, view);
-  Image image = develop();
+  draw_prepass(models, frame, false);
+  draw_visibility(frame, box);
+  draw_lit(models, frame);
+  if (std::any_of(models.begin(), models.end(), is_water)) {
+    draw_water(models, frame);
+    draw_prepass(models, frame, true);
+  }
+  bool veil = false, glow = false;
+  if (any_of_kind(particles, true) || any_of_kind(particles, false)) {
+    if (!effects) effects.emplace(drawn_width(), drawn_height());
+    if (any_of_kind(particles, false)) veil = effects->draw_veil(frame, particles, resolve());
+    if (any_of_kind(particles, true)) glow = effects->draw_glow(frame, particles);
+  }
+  Image image = develop(veil, glow);
   gl::check("draw");
   return image;
 }
@@ -530,7 +703,12 @@ void Stage::set_look(const Look& look) {
 }
 
 Image Stage::draw(std::span<const Model> models, const Camera& camera, const std::vector<std::string>& caption_lines) {
-  Image image = studio_->draw(models, camera);
+  return draw(models, {}, camera, caption_lines);
+}
+
+Image Stage::draw(std::span<const Model> models, std::span<const Particles> particles, const Camera& camera,
+                  const std::vector<std::string>& caption_lines) {
+  Image image = studio_->draw(models, particles, camera);
   draw_caption(image, caption_lines);
   return image;
 }

@@ -4,6 +4,7 @@
 
 #include <render/camera.hpp>
 #include <render/image.hpp>
+#include <render/particles.hpp>
 
 #include <hooke/types.hpp>
 
@@ -23,21 +24,34 @@ using TextureCoordinates = Eigen::Array<double, Eigen::Dynamic, 2>;
 struct Material {
   enum class Kind {
     Matte,  ///< one smooth opaque surface with a soft highlight
-    Cloth   ///< woven: sheen at grazing angles, lining, thread detail, stitched hem
+    Cloth,  ///< woven: sheen at grazing angles, lining, thread detail, stitched hem
+    Stone,  ///< sandstone, its layers and grains where it stands in the studio; must not move
+    Metal,  ///< brushed around the vertical; mirrors the studio
+    Water   ///< clear: bends what is behind, mirrors the studio and the picture; throws no shadow
   };
   Kind kind = Kind::Matte;
-  Vec3 color{0.38, 0.35, 0.32};            ///< outside; the default is a warm grey mannequin
+  /// Outside; the default is a warm grey mannequin. Water: what 10 cm of it leave of light.
+  Vec3 color{0.38, 0.35, 0.32};
   Vec3 inside_color{0.105, 0.045, 0.060};  ///< what back faces show (cloth: the lining)
   Vec3 sheen{0.30, 0.12, 0.11};            ///< cloth: colour of the fuzz at grazing angles
   double roughness = 0.55;  ///< in (0, 1]; higher spreads and dims the highlight (matte) or sheen (cloth)
   double weave = 700;       ///< cloth: threads per metre, 0 for none; drawn only where the model has uv
+  double wetness = 0;       ///< stone: in [0, 1]; wet stone is darker and shines
 };
+
+/// Materials with the studio's values for them.
+Material water();      ///< clear, a little blue-green
+Material sandstone();  ///< warm, dry
+Material steel();      ///< brushed
 
 /// A mesh and how to draw it. What the pointers name must live until draw() returns.
 /// Normals are computed from the mesh in every picture.
 struct Model {
   const TriangleMesh* mesh = nullptr;  ///< required; triangles counter-clockwise seen from outside
   Material material{};
+  /// Optional, one number in [0, 1] a vertex. Water: how much foam lies there (null: none).
+  /// Stone: multiplies the material's wetness (null: 1).
+  const Values<float>* cover = nullptr;
   const TextureCoordinates* uv = nullptr;  ///< optional, one row a vertex [m]: ties the weave to the cloth
   double thickness = 0;  ///< [m]; above 0 two sheets at ± half of it are drawn, closed by a rounded hem
   int subdivisions = 0;  ///< 0 to 2: rounds the mesh between its vertices, four times the triangles each
@@ -51,6 +65,7 @@ struct Look {
   Vec3 rim_direction{0.62, 0.42, -0.66};  ///< towards the cool light behind the subject; any length
   double rim_intensity = 1;
   double fill_intensity = 1;           ///< light from all around
+  double bloom = 0.18;                 ///< share of the sparks' light that spreads in the lens, in [0, 1]
   double exposure = 1;                 ///< multiplies everything before tone mapping
   Vec3 floor_color{0.36, 0.36, 0.37};  ///< linear RGB reflectance of the floor
 };
@@ -58,6 +73,9 @@ struct Look {
 /// The default look turned so that, for `camera`, the key light comes from the left and
 /// above and the rim light from behind right. Keep one look for a shot, or shadows turn.
 Look look_for(const Camera& camera);
+
+/// The same in a dim workshop with a dark floor, where sparks light the scene.
+Look workshop_for(const Camera& camera);
 
 /// Draws pictures of one size. Owns an off-screen OpenGL context (software; no display or
 /// GPU needed), so it must not be used by two threads at once; it may move between threads.
@@ -80,6 +98,13 @@ class Stage {
   /// place in `models`, so keep the order from frame to frame. Throws std::invalid_argument
   /// naming the model and vertex if a coordinate is not finite or an index out of range.
   Image draw(std::span<const Model> models, const Camera& camera, const std::vector<std::string>& caption_lines = {});
+
+  /// The same with particles, which also light the models and the floor. Without any, or
+  /// with empty ones only, the picture is that of the other draw(), to the byte. Smoke and drops are
+  /// sorted; the order they are given in does not show. Throws std::invalid_argument naming the
+  /// particles, the array and the index of what cannot be drawn.
+  Image draw(std::span<const Model> models, std::span<const Particles> particles, const Camera& camera,
+             const std::vector<std::string>& caption_lines = {});
 
  private:
   struct Studio;

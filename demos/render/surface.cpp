@@ -236,6 +236,26 @@ void Surface::update(const Points<double>& vertices) {
   write_sheets();
 }
 
+void Surface::set_cover(const Values<float>* values, float otherwise) {
+  const std::size_t n = position_.size();
+  std::vector<float> cover(n, otherwise);
+  if (values) {
+    if (values->rows() != given_count_)
+      throw std::invalid_argument("cover must have one row a vertex (" + std::to_string(given_count_) + "), got " +
+                                  std::to_string(values->rows()));
+    for (Index i = 0; i < given_count_; ++i) {
+      if (!((*values)(i) >= 0 && (*values)(i) <= 1))
+        throw std::invalid_argument("cover[" + std::to_string(i) + "] must be in [0, 1], got " +
+                                    std::to_string((*values)(i)));
+      cover[static_cast<std::size_t>(i)] = (*values)(i);
+    }
+    auto place = static_cast<std::size_t>(given_count_);
+    for (const auto& level : midpoints_)
+      for (const auto& [a, b] : level) cover[place++] = 0.5f * (cover[a] + cover[b]);
+  }
+  for (std::size_t i = 0; i < n; ++i) drawn_[i].side = cover[i];
+}
+
 void Surface::write_sheets() {
   const auto set = [](SurfaceVertex& vertex, const Vec3& position, const Vec3& normal) {
     for (int k = 0; k < 3; ++k) {

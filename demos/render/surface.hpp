@@ -14,7 +14,7 @@ struct SurfaceVertex {
   float position[3];  ///< [m]
   float normal[3];    ///< unit
   float uv[2];        ///< along the cloth [m]
-  float side;         ///< 0 outside, 1 inside
+  float side;         ///< 0 outside, 1 inside; water and stone: the model's cover
   float hem;          ///< distance to the border along the cloth [m]; large where there is none
 };
 
@@ -32,6 +32,9 @@ class Surface {
   /// Recomputes positions and normals. Throws std::invalid_argument that names the vertex
   /// if a coordinate is not finite.
   void update(const Points<double>& vertices);
+  /// Sets the vertices' cover: `values` (one a given vertex, throws std::invalid_argument if
+  /// not, or outside [0, 1]), or `otherwise` everywhere if null.
+  void set_cover(const Values<float>* values, float otherwise);
 
   const std::vector<SurfaceVertex>& vertices() const { return drawn_; }
   const std::vector<std::uint32_t>& indices() const { return indices_; }

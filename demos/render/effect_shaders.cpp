@@ -1,0 +1,330 @@
+#include <render/shaders.hpp>
+
+namespace hooke::render {
+
+namespace {
+
+const char* const kVersion = "#version 330 core\n";
+
+// What a smooth thing mirrors of the studio: its wall, the light from above, the floor,
+// and the two lamps, `spread` wider [rad] for rough things.
+const char* const kStudio = R"(
+uniform vec3 key_direction, rim_direction, key_color, rim_color, sky_color, ground_color, floor_color;
+uniform float key_size;
+vec3 lamp_disc(vec3 d, vec3 towards, vec3 color, float half_angle) {
+  float c = dot(d, towards), edge = cos(half_angle);
+  float soft = 0.35 * (1.0 - edge);
+  return color * smoothstep(edge - soft, edge + soft, c) / (1.0 - cos(half_angle)) * 0.5;
+}
+vec3 mirrored(vec3 d, float spread) {
+  vec3 lit_floor = floor_color * (key_color * key_direction.y + sky_color);
+  vec3 wall = floor_color * (0.36 * key_color * key_direction.y + 0.55 * sky_color);
+  vec3 above = mix(wall, 1.35 * sky_color, smoothstep(0.05, 0.75, d.y));
+  vec3 around = mix(lit_floor, above, smoothstep(-0.25 - spread, 0.02 + spread, d.y));
+  float half_angle = 0.5 * key_size + 0.03 + spread;
+  return around + lamp_disc(d, key_direction, key_color, half_angle) + lamp_disc(d, rim_direction, rim_color, 0.16 + spread);
+}
+)";
+
+// A streak is all points within `thickness` of the way from head to tail, in the picture.
+// Its light is that of the ball it stands for, seen for the time the shutter was open:
+// radiance times the ball's area in the picture, however thick and long it is drawn.
+const char* const kStreakVertex = R"(
+layout(location = 0) in vec4 head_radius;
+layout(location = 1) in vec3 tail;
+layout(location = 2) in vec3 radiance;
+uniform mat4 to_clip;
+uniform vec3 eye, forward, ray_up;
+uniform vec2 picture;
+uniform float near, least_thickness;
+flat out vec4 way;        // head and tail [pixels]
+flat out vec2 nearness;   // 1 / depth of head and tail
+flat out vec3 light_peak;
+flat out vec2 thickness_slack;
+const float fade = 0.12;  // light at the tail, as a share of the head's
+void main() {
+  vec3 h = head_radius.xyz, t = tail;
+  float hd = dot(h - eye, forward), td = dot(t - eye, forward);
+  float kept = 1.0;
+  gl_Position = vec4(2, 2, 2, 1);
+  if (max(hd, td) > near) {
+    if (hd < near) { float s = (near - td) / (hd - td); h = mix(t, h, s); hd = near; kept = s; }
+    if (td < near) { float s = (near - hd) / (td - hd); t = mix(h, t, s); td = near; kept = s; }
+    vec4 hc = to_clip * vec4(h, 1), tc = to_clip * vec4(t, 1);
+    vec2 a = (hc.xy / hc.w * 0.5 + 0.5) * picture, b = (tc.xy / tc.w * 0.5 + 0.5) * picture;
+    float depth = 2.0 / (1.0 / hd + 1.0 / td);
+    float radius = head_radius.w * 0.5 * picture.y / (depth * length(ray_up));
+    float thick = min(max(1.25 * radius, least_thickness), picture.y);
+    vec2 along = a - b;
+    float reach = length(along);
+    along = reach > 1e-4 ? along / reach : vec2(1, 0);
+    vec2 across = vec2(-along.y, along.x);
+    // The integrals of light_at over the straight part and the two round ends.
+    float whole = reach * thick * 16.0 / 15.0 * (fade + (1.0 - fade) / 3.0) + 0.5235988 * thick * thick * (1.0 + fade);
+    light_peak = radiance * kept * 3.1415927 * radius * radius / whole;
+    way = vec4(a, b);
+    nearness = 1.0 / vec2(hd, td);
+    thickness_slack = vec2(thick, head_radius.w);
+    vec2 corner = vec2(gl_VertexID & 1, gl_VertexID >> 1);
+    vec2 at = mix(b, a, corner.x) + (2.0 * corner.x - 1.0) * along * (thick + 0.5) + (2.0 * corner.y - 1.0) * across * (thick + 0.5);
+    gl_Position = vec4(at / picture * 2.0 - 1.0, 0, 1);
+  }
+})";
+
+const char* const kStreak = R"(
+flat in vec4 way;
+flat in vec2 nearness;
+flat in vec3 light_peak;
+flat in vec2 thickness_slack;
+out vec4 light;
+const float fade = 0.12;
+void main() {
+  vec2 to_tail = way.zw - way.xy, from_head = gl_FragCoord.xy - way.xy;
+  float t = clamp(dot(from_head, to_tail) / max(dot(to_tail, to_tail), 1e-6), 0.0, 1.0);
+  vec2 off = (from_head - t * to_tail) / thickness_slack.x;
+  float inside = max(0.0, 1.0 - dot(off, off));
+  float depth = 1.0 / mix(nearness.x, nearness.y, t);
+  float slack = thickness_slack.y + 0.002 * depth;
+  float seen = clamp(1.0 + (texelFetch(normal_depth, ivec2(gl_FragCoord.xy), 0).w - depth) / slack, 0.0, 1.0);
+  light = vec4(light_peak * (fade + (1.0 - fade) * (1.0 - t) * (1.0 - t)) * inside * inside * seen, 1);
+})";
+
+const char* const kSpriteVertex = R"(
+layout(location = 0) in vec4 place_radius;
+layout(location = 1) in vec4 color_opacity;
+layout(location = 2) in vec4 way_turn;     // drops: from tail to head [m]
+layout(location = 3) in vec4 lamp_shade;   // light of the sparks; how much of the key light gets here
+uniform mat4 to_clip;
+uniform vec3 eye, forward, ray_right, ray_up;
+uniform vec2 picture;
+uniform float near, least_radius;
+flat out vec3 middle;
+flat out vec4 color;
+flat out vec4 lamp;
+flat out vec4 shape;   // depth, radius [m], half length and half width [pixels]
+flat out vec4 axes;    // the long axis in the picture; turn and pattern
+out vec2 local;        // 1 at the rim
+void main() {
+  middle = place_radius.xyz;
+  float depth = dot(middle - eye, forward), radius = place_radius.w;
+  gl_Position = vec4(2, 2, 2, 1);
+  if (depth > near) {
+    vec4 clip = to_clip * vec4(middle, 1);
+    vec2 at = (clip.xy / clip.w * 0.5 + 0.5) * picture;
+    float pixels = 0.5 * picture.y / (depth * length(ray_up));
+    vec2 along = vec2(dot(way_turn.xyz, ray_right) / length(ray_right), dot(way_turn.xyz, ray_up) / length(ray_up));
+    float half_way = 0.5 * length(along) * pixels, real = radius * pixels;
+    along = half_way > 1e-4 ? normalize(along) : vec2(1, 0);
+    float wide = max(real, least_radius), longer = wide + half_way;
+    color = color_opacity;
+    // What is drawn larger or smeared along its way hides less.
+    color.a *= (real / wide) * (real / wide) * (half_way > 0.0 ? min(1.0, 1.25 * wide / longer) : 1.0);
+    lamp = lamp_shade;
+    shape = vec4(depth, radius, longer, wide);
+    axes = vec4(along, way_turn.w, fract(way_turn.w * 0.8270));
+    vec2 corner = vec2(gl_VertexID & 1, gl_VertexID >> 1) * 2.0 - 1.0;
+    vec2 size = vec2(longer, wide) + 1.0;
+    local = corner * size / (size - 1.0);
+    vec2 offset = corner.x * size.x * along + corner.y * size.y * vec2(-along.y, along.x);
+    gl_Position = vec4((at + offset) / picture * 2.0 - 1.0, 0, 1);
+  }
+})";
+
+// A puff is a ball of haze (spherical billboards, Umenhoffer, Szirmay-Kalos and Szijarto
+// 2006): where a surface cuts it, what is left in front is thinner.
+const char* const kPuff = R"(
+flat in vec3 middle;
+flat in vec4 color;
+flat in vec4 lamp;
+flat in vec4 shape;
+flat in vec4 axes;
+in vec2 local;
+uniform sampler2D puff_map;
+uniform int patterns, pictured;
+uniform float near;
+out vec4 veil;
+void main() {
+  float c = cos(axes.z), s = sin(axes.z);
+  vec2 turned = mat2(c, s, -s, c) * local;
+  vec2 at = clamp(turned * 0.5 + 0.5, vec2(0.004), vec2(0.996));
+  float tile = floor(axes.w * float(patterns));
+  vec4 puff = textureLod(puff_map, vec2((at.x + tile) / float(patterns), at.y), 0.0);
+  float rim2 = dot(local, local);
+  float bulge = sqrt(max(0.0, 1.0 - rim2)), half_depth = shape.y * max(bulge, 0.02);
+  float behind = texelFetch(normal_depth, ivec2(gl_FragCoord.xy), 0).w;
+  float in_front = clamp((behind - shape.x + half_depth) / (2.0 * half_depth), 0.0, 1.0);
+  in_front *= clamp((shape.x - near) / shape.y, 0.0, 1.0) * (rim2 < 1.0 || pictured == 1 ? 1.0 : 0.0);
+  if (any(greaterThan(abs(turned), vec2(1)))) in_front = 0.0;
+  float hides = color.a * puff.a * in_front;
+  vec2 tilt = pictured == 1 ? vec2(0) : mat2(c, -s, s, c) * (puff.rg * 2.0 - 1.0);
+  vec3 n = normalize((0.75 * local.x + tilt.x) * normalize(ray_right) + (0.75 * local.y + tilt.y) * normalize(ray_up) - (0.35 + 0.65 * bulge) * forward);
+  float key = max(0.0, (dot(n, key_direction) + 0.7) / 1.7), rim = max(0.0, (dot(n, rim_direction) + 0.8) / 1.8);
+  float up = 0.5 + 0.5 * n.y;
+  vec3 lit = key_color * key * key * lamp.w + 0.45 * rim_color * rim * rim + sky_color * up * mix(0.45, 1.0, lamp.w) + ground_color * floor_color * (1.0 - up);
+  vec3 tint = color.rgb * (pictured == 1 ? puff.rgb : vec3(1));
+  veil = vec4(tint * (lit + lamp.rgb) * hides, hides);
+})";
+
+// A drop is a ball lens: it shows what is behind it upside down, mirrors the studio at its
+// rim, and gathers the key light to a point on the far side.
+const char* const kDrop = R"(
+flat in vec3 middle;
+flat in vec4 color;
+flat in vec4 lamp;
+flat in vec4 shape;
+flat in vec4 axes;
+in vec2 local;
+uniform sampler2D scene;
+out vec4 veil;
+void main() {
+  float rim = length(local);
+  vec2 inside = local * min(1.0, 0.995 / max(rim, 1e-4));
+  float bulge = sqrt(max(0.0, 1.0 - dot(inside, inside)));
+  vec2 flat_n = vec2(inside.x * shape.w / shape.z, inside.y);
+  flat_n = flat_n.x * axes.xy + flat_n.y * vec2(-axes.y, axes.x);
+  vec3 n = normalize(flat_n.x * normalize(ray_right) + flat_n.y * normalize(ray_up) - bulge * forward);
+  float depth = shape.x - bulge * shape.y;
+  vec3 v = normalize(eye - middle);
+  float nv = clamp(dot(n, v), 0.02, 1.0), fresnel = 0.02 + 0.98 * pow(1.0 - nv, 5.0);
+  vec2 behind = clamp(gl_FragCoord.xy - flat_n * (1.2 * shape.w + 3.0) * (0.6 + 0.8 * rim), vec2(0.5), picture - 0.5);
+  vec3 through = texture(scene, behind / picture).rgb * color.rgb * mix(1.0, 0.72, rim * rim * rim);
+  vec3 caustic = key_color * 1.4 * pow(clamp(dot(-n, key_direction) * 0.5 + 0.35 * (1.0 - bulge) + 0.25, 0.0, 1.0), 6.0);
+  vec3 light = mix(through + caustic * color.rgb, mirrored(reflect(-v, n), 0.12), fresnel) + lamp.rgb * 0.15;
+  float seen = clamp(1.0 + (texelFetch(normal_depth, ivec2(gl_FragCoord.xy), 0).w - depth) / (0.25 * shape.y + 0.001 * depth), 0.0, 1.0);
+  float hides = color.a * clamp((1.0 - rim) * shape.w + 0.5, 0.0, 1.0) * seen;
+  veil = vec4(light * hides, hides);
+})";
+
+// Down by half: five overlapping boxes (Jimenez, "Next Generation Post Processing in Call
+// of Duty", SIGGRAPH 2014), so that thin bright things do not flicker.
+const char* const kNarrow = R"(
+uniform sampler2D source;
+uniform vec2 size;  // of the target
+out vec4 spread;
+void main() {
+  vec2 at = gl_FragCoord.xy / size, d = 1.0 / vec2(textureSize(source, 0));
+  vec3 sum = vec3(0);
+  for (int y = -2; y <= 2; ++y)
+    for (int x = -2; x <= 2; ++x) {
+      bool odd = (x & 1) == 1 || (y & 1) == 1;
+      if (odd && ((x & 1) != 1 || (y & 1) != 1)) continue;
+      float weight = odd ? 0.125 : 0.03125 * (x == 0 ? 2.0 : 1.0) * (y == 0 ? 2.0 : 1.0);
+      sum += weight * texture(source, at + d * vec2(x, y)).rgb;
+    }
+  spread = vec4(sum, 1);
+})";
+
+const char* const kWiden = R"(
+uniform sampler2D source;
+uniform vec2 size;
+uniform float share;
+out vec4 spread;
+void main() {
+  vec2 at = gl_FragCoord.xy / size, d = 1.0 / vec2(textureSize(source, 0));
+  vec3 sum = vec3(0);
+  for (int y = -1; y <= 1; ++y)
+    for (int x = -1; x <= 1; ++x)
+      sum += (x == 0 ? 2.0 : 1.0) * (y == 0 ? 2.0 : 1.0) / 16.0 * texture(source, at + d * vec2(x, y)).rgb;
+  spread = vec4(share * sum, 1);
+})";
+
+// The mean of a pixel's samples, for what bends the light of the picture behind it.
+const char* const kResolve = R"(
+uniform sampler2DMS picture_light;
+uniform int samples;
+out vec4 light;
+void main() {
+  vec3 sum = vec3(0);
+  for (int s = 0; s < samples; ++s) sum += min(texelFetch(picture_light, ivec2(gl_FragCoord.xy), s).rgb, 50.0);
+  light = vec4(sum / float(samples), 1);
+})";
+
+const char* const kWater = R"(
+centroid in vec3 place;
+centroid in vec3 facing;
+centroid in vec2 cloth_place;
+centroid in float side;
+centroid in float hem;
+uniform sampler2D scene;
+uniform mat4 to_clip;
+uniform vec3 outside_color;
+uniform float roughness;
+out vec4 light;
+
+float hash(vec3 c) {
+  c = fract(c * 0.1031);
+  c += dot(c, c.zyx + 31.32);
+  return fract((c.x + c.y) * c.z);
+}
+float noise(vec3 c) {
+  vec3 i = floor(c), f = fract(c);
+  f = f * f * (3.0 - 2.0 * f);
+  return mix(mix(mix(hash(i), hash(i + vec3(1, 0, 0)), f.x), mix(hash(i + vec3(0, 1, 0)), hash(i + vec3(1, 1, 0)), f.x), f.y),
+             mix(mix(hash(i + vec3(0, 0, 1)), hash(i + vec3(1, 0, 1)), f.x), mix(hash(i + vec3(0, 1, 1)), hash(i + vec3(1, 1, 1)), f.x), f.y), f.z);
+}
+vec4 behind(vec2 pixel) { return texelFetch(normal_depth, ivec2(clamp(pixel, vec2(0.5), picture - 0.5)), 0); }
+vec2 pixel_of(vec3 p) {
+  vec4 c = to_clip * vec4(p, 1);
+  return clamp((c.xy / max(c.w, 1e-4) * 0.5 + 0.5) * picture, vec2(0.5), picture - 0.5);
+}
+
+void main() {
+  vec3 n = normalize(facing), v = normalize(eye - place);
+  if (dot(n, v) < 0.0) n = -n;
+  float nv = clamp(dot(n, v), 0.03, 1.0), fresnel = 0.02 + 0.98 * pow(1.0 - nv, 5.0);
+  float depth = dot(place - eye, forward), slant = max(0.05, -dot(v, forward));
+
+  // Through: follow the bent ray as far as the water seems deep, and take the picture there.
+  float deep = clamp((behind(gl_FragCoord.xy).w - depth) / slant, 0.0, 2.0);
+  vec3 bent = refract(-v, n, 1.0 / 1.333);
+  vec2 at = pixel_of(place + bent * deep * 0.8);
+  float there = behind(at).w;
+  if (there < depth) { at = gl_FragCoord.xy; there = behind(at).w; }
+  float way = clamp((there - depth) / slant, 0.0, 3.0);
+  vec3 left = pow(max(outside_color, vec3(0.01)), vec3(way / 0.1));
+  vec3 through = texture(scene, at / picture).rgb * left + outside_color * (1.0 - left) * 0.16 * (sky_color + 0.5 * key_color);
+
+  // Mirrored: what of the solid picture the ray meets, else the studio.
+  vec3 r = reflect(-v, n);
+  vec3 mirror = mirrored(r, 0.5 * roughness);
+  float stride = 0.03;
+  int steps = r.y > -0.2 ? 14 : 0;
+  float found = 0.0;
+  vec3 p = place + n * 0.004, met = vec3(0);
+  for (int i = 0; i < steps; ++i) {
+    p += r * stride;
+    stride *= 1.22;
+    vec2 q = pixel_of(p);
+    float gap = dot(p - eye, forward) - behind(q).w;
+    if (gap > 0.0 && gap < 0.08 + 2.0 * stride) {
+      met = texture(scene, q / picture).rgb;
+      vec2 rim = min(q, picture - q) / (0.06 * picture);
+      found = clamp(min(rim.x, rim.y), 0.0, 1.0);
+      break;
+    }
+  }
+  mirror = mix(mirror, met, found);
+  vec3 result = mix(through, mirror, fresnel);
+
+  // Foam: bubbles break up where there is little of it and close where there is much.
+  float bubbles = 0.55 * noise(place * 60.0) + 0.3 * noise(place * 140.0) + 0.15 * noise(place * 330.0);
+  float foam = smoothstep(0.0, 0.28, side - 0.75 * bubbles) * clamp(1.6 * side, 0.0, 1.0);
+  float wrap = clamp((dot(n, key_direction) + 0.3) / 1.3, 0.0, 1.0);
+  vec3 white = vec3(0.82, 0.86, 0.88) * (0.75 + 0.35 * bubbles) * (key_color * wrap * 0.75 + sky_color);
+  light = vec4(mix(result, white, 0.92 * foam), 1);
+})";
+
+}  // namespace
+
+std::string studio_functions() { return kStudio; }
+std::string streak_vertex_shader() { return std::string(kVersion) + kStreakVertex; }
+std::string streak_fragment_shader() { return kVersion + place_of_pixel() + kStreak; }
+std::string sprite_vertex_shader() { return std::string(kVersion) + kSpriteVertex; }
+std::string puff_fragment_shader() { return kVersion + place_of_pixel() + kStudio + kPuff; }
+std::string drop_fragment_shader() { return kVersion + place_of_pixel() + kStudio + kDrop; }
+std::string narrow_fragment_shader() { return std::string(kVersion) + kNarrow; }
+std::string widen_fragment_shader() { return std::string(kVersion) + kWiden; }
+std::string resolve_fragment_shader() { return std::string(kVersion) + kResolve; }
+std::string water_fragment_shader() { return kVersion + place_of_pixel() + kStudio + kWater; }
+
+}  // namespace hooke::render
