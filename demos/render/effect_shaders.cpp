@@ -41,7 +41,7 @@ flat out vec4 way;        // head and tail [pixels]
 flat out vec2 nearness;   // 1 / depth of head and tail
 flat out vec3 light_peak;
 flat out vec2 thickness_slack;
-const float fade = 0.12;  // light at the tail, as a share of the head's
+flat out float fade;      // light at the tail, as a share of the head's
 void main() {
   vec3 h = head_radius.xyz, t = tail;
   float hd = dot(h - eye, forward), td = dot(t - eye, forward);
@@ -59,7 +59,8 @@ void main() {
     float reach = length(along);
     along = reach > 1e-4 ? along / reach : vec2(1, 0);
     vec2 across = vec2(-along.y, along.x);
-    // The integrals of light_at over the straight part and the two round ends.
+    fade = 1.0 - 0.88 * reach / (reach + 2.0 * thick);
+    // The integrals of the light over the straight part and the two round ends.
     float whole = reach * thick * 16.0 / 15.0 * (fade + (1.0 - fade) / 3.0) + 0.5235988 * thick * thick * (1.0 + fade);
     light_peak = radiance * kept * 3.1415927 * radius * radius / whole;
     way = vec4(a, b);
@@ -76,8 +77,8 @@ flat in vec4 way;
 flat in vec2 nearness;
 flat in vec3 light_peak;
 flat in vec2 thickness_slack;
+flat in float fade;
 out vec4 light;
-const float fade = 0.12;
 void main() {
   vec2 to_tail = way.zw - way.xy, from_head = gl_FragCoord.xy - way.xy;
   float t = clamp(dot(from_head, to_tail) / max(dot(to_tail, to_tail), 1e-6), 0.0, 1.0);
@@ -98,11 +99,12 @@ uniform mat4 to_clip;
 uniform vec3 eye, forward, ray_right, ray_up;
 uniform vec2 picture;
 uniform float near, least_radius;
+uniform int puffs, patterns;
 flat out vec3 middle;
 flat out vec4 color;
 flat out vec4 lamp;
 flat out vec4 shape;   // depth, radius [m], half length and half width [pixels]
-flat out vec4 axes;    // the long axis in the picture; turn and pattern
+flat out vec4 axes;    // drops: the long axis in the picture; puffs: cosine and sine of the turn, pattern
 out vec2 local;        // 1 at the rim
 void main() {
   middle = place_radius.xyz;
@@ -121,7 +123,12 @@ void main() {
     color.a *= (real / wide) * (real / wide) * (half_way > 0.0 ? min(1.0, 1.25 * wide / longer) : 1.0);
     lamp = lamp_shade;
     shape = vec4(depth, radius, longer, wide);
-    axes = vec4(along, way_turn.w, fract(way_turn.w * 0.8270));
+    // A puff is turned, by an angle that also picks one of its patterns; a drop is drawn out.
+    axes = vec4(along, 0.0, 0.0);
+    if (puffs == 1) {
+      axes = vec4(cos(way_turn.w), sin(way_turn.w), 0.0, floor(fract(way_turn.w * 0.8270) * float(patterns)));
+      color.a *= clamp((depth - near) / radius, 0.0, 1.0);
+    }
     vec2 corner = vec2(gl_VertexID & 1, gl_VertexID >> 1) * 2.0 - 1.0;
     vec2 size = vec2(longer, wide) + 1.0;
     local = corner * size / (size - 1.0);
@@ -142,31 +149,31 @@ in vec2 local;
 uniform sampler2D puff_map;
 uniform int patterns, pictured;
 uniform float near;
+uniform vec3 key_direction, rim_direction, above;  // in the picture's basis: right, up, towards the eye
+uniform vec3 key_color, rim_color, sky_color, ground_color, floor_color;
 out vec4 veil;
 void main() {
-  float c = cos(axes.z), s = sin(axes.z);
-  vec2 turned = mat2(c, s, -s, c) * local;
-  vec2 at = clamp(turned * 0.5 + 0.5, vec2(0.004), vec2(0.996));
-  float tile = floor(axes.w * float(patterns));
-  vec4 puff = textureLod(puff_map, vec2((at.x + tile) / float(patterns), at.y), 0.0);
-  float rim2 = dot(local, local);
-  float bulge = sqrt(max(0.0, 1.0 - rim2)), half_depth = shape.y * max(bulge, 0.02);
+  vec2 turn = axes.xy;  // cosine and sine
+  vec2 turned = vec2(turn.x * local.x - turn.y * local.y, turn.y * local.x + turn.x * local.y);
+  vec2 at = clamp(turned * 0.5 + 0.5, 0.004, 0.996);
+  vec4 puff = textureLod(puff_map, vec2((at.x + axes.w) / float(patterns), at.y), 0.0);
+  float bulge = sqrt(max(0.0, 1.0 - dot(local, local))), half_depth = shape.y * max(bulge, 0.02);
   float behind = texelFetch(normal_depth, ivec2(gl_FragCoord.xy), 0).w;
   float in_front = clamp((behind - shape.x + half_depth) / (2.0 * half_depth), 0.0, 1.0);
-  in_front *= clamp((shape.x - near) / shape.y, 0.0, 1.0) * (rim2 < 1.0 || pictured == 1 ? 1.0 : 0.0);
-  if (any(greaterThan(abs(turned), vec2(1)))) in_front = 0.0;
+  in_front *= max(abs(turned.x), abs(turned.y)) < 1.0 ? 1.0 : 0.0;
   float hides = color.a * puff.a * in_front;
-  vec2 tilt = pictured == 1 ? vec2(0) : mat2(c, -s, s, c) * (puff.rg * 2.0 - 1.0);
-  vec3 n = normalize((0.75 * local.x + tilt.x) * normalize(ray_right) + (0.75 * local.y + tilt.y) * normalize(ray_up) - (0.35 + 0.65 * bulge) * forward);
+  vec2 lean = puff.rg * 2.0 - 1.0;
+  lean = pictured == 1 ? vec2(0) : vec2(turn.x * lean.x + turn.y * lean.y, turn.x * lean.y - turn.y * lean.x);
+  vec3 n = normalize(vec3(0.75 * local + lean, 0.35 + 0.65 * bulge));
   float key = max(0.0, (dot(n, key_direction) + 0.7) / 1.7), rim = max(0.0, (dot(n, rim_direction) + 0.8) / 1.8);
-  float up = 0.5 + 0.5 * n.y;
-  vec3 lit = key_color * key * key * lamp.w + 0.45 * rim_color * rim * rim + sky_color * up * mix(0.45, 1.0, lamp.w) + ground_color * floor_color * (1.0 - up);
-  vec3 tint = color.rgb * (pictured == 1 ? puff.rgb : vec3(1));
-  veil = vec4(tint * (lit + lamp.rgb) * hides, hides);
+  float up = 0.5 + 0.5 * dot(n, above);
+  vec3 lit = key_color * (key * key * lamp.w) + rim_color * (0.45 * rim * rim) + sky_color * (up * (0.45 + 0.55 * lamp.w)) +
+             ground_color * floor_color * (1.0 - up) + lamp.rgb;
+  veil = vec4(color.rgb * (pictured == 1 ? puff.rgb : vec3(1)) * lit * hides, hides);
 })";
 
-// A drop is a ball lens: it shows what is behind it upside down, mirrors the studio at its
-// rim, and gathers the key light to a point on the far side.
+// A drop is a ball of water: light that goes through is bent going in and coming out, so
+// it shows nearly all that is behind it, upside down, and at its rim mirrors the studio.
 const char* const kDrop = R"(
 flat in vec3 middle;
 flat in vec4 color;
@@ -175,24 +182,30 @@ flat in vec4 shape;
 flat in vec4 axes;
 in vec2 local;
 uniform sampler2D scene;
+uniform mat4 to_clip;
 out vec4 veil;
 void main() {
   float rim = length(local);
-  vec2 inside = local * min(1.0, 0.995 / max(rim, 1e-4));
+  vec2 inside = local * min(1.0, 0.985 / max(rim, 1e-4));
   float bulge = sqrt(max(0.0, 1.0 - dot(inside, inside)));
-  vec2 flat_n = vec2(inside.x * shape.w / shape.z, inside.y);
-  flat_n = flat_n.x * axes.xy + flat_n.y * vec2(-axes.y, axes.x);
-  vec3 n = normalize(flat_n.x * normalize(ray_right) + flat_n.y * normalize(ray_up) - bulge * forward);
-  float depth = shape.x - bulge * shape.y;
+  vec2 lean = vec2(inside.x * shape.w / shape.z, inside.y);
+  lean = lean.x * axes.xy + lean.y * vec2(-axes.y, axes.x);
   vec3 v = normalize(eye - middle);
+  vec3 n = normalize(lean.x * normalize(ray_right) + lean.y * normalize(ray_up) + bulge * v);
+  float depth = shape.x - bulge * shape.y;
   float nv = clamp(dot(n, v), 0.02, 1.0), fresnel = 0.02 + 0.98 * pow(1.0 - nv, 5.0);
-  vec2 behind = clamp(gl_FragCoord.xy - flat_n * (1.2 * shape.w + 3.0) * (0.6 + 0.8 * rim), vec2(0.5), picture - 0.5);
-  vec3 through = texture(scene, behind / picture).rgb * color.rgb * mix(1.0, 0.72, rim * rim * rim);
-  vec3 caustic = key_color * 1.4 * pow(clamp(dot(-n, key_direction) * 0.5 + 0.35 * (1.0 - bulge) + 0.25, 0.0, 1.0), 6.0);
-  vec3 light = mix(through + caustic * color.rgb, mirrored(reflect(-v, n), 0.12), fresnel) + lamp.rgb * 0.15;
+  vec3 within = refract(-v, n, 0.75), out_n = n - 2.0 * dot(n, within) * within;
+  vec3 beyond = refract(within, -out_n, 1.333);
+  if (dot(beyond, beyond) < 0.5) beyond = within;
+  // What lies that way: the picture where it shows it, else the studio.
+  vec4 clip = to_clip * vec4(middle + 1.2 * beyond, 1);
+  vec2 at = clip.xy / max(clip.w, 1e-3) * 0.5 + 0.5, within_picture = min(at, 1.0 - at);
+  float shown = clip.w > 0.05 ? clamp(20.0 * min(within_picture.x, within_picture.y), 0.0, 1.0) : 0.0;
+  vec3 through = mix(mirrored(beyond, 0.05), texture(scene, clamp(at, 0.0, 1.0)).rgb, shown);
+  vec3 light = mix(through * color.rgb * (1.0 - 0.35 * pow(rim, 6.0)), mirrored(reflect(-v, n), 0.05), fresnel) + lamp.rgb * 0.15;
   float seen = clamp(1.0 + (texelFetch(normal_depth, ivec2(gl_FragCoord.xy), 0).w - depth) / (0.25 * shape.y + 0.001 * depth), 0.0, 1.0);
   float hides = color.a * clamp((1.0 - rim) * shape.w + 0.5, 0.0, 1.0) * seen;
-  veil = vec4(light * hides, hides);
+  veil = vec4(min(light, 40.0) * hides, hides);
 })";
 
 // Down by half: five overlapping boxes (Jimenez, "Next Generation Post Processing in Call
@@ -262,6 +275,20 @@ float noise(vec3 c) {
   return mix(mix(mix(hash(i), hash(i + vec3(1, 0, 0)), f.x), mix(hash(i + vec3(0, 1, 0)), hash(i + vec3(1, 1, 0)), f.x), f.y),
              mix(mix(hash(i + vec3(0, 0, 1)), hash(i + vec3(1, 0, 1)), f.x), mix(hash(i + vec3(0, 1, 1)), hash(i + vec3(1, 1, 1)), f.x), f.y), f.z);
 }
+// 0 in the middle of a cell of bubbles, 1 on the walls between (Worley's noise).
+float bubbles(vec2 c) {
+  vec2 i = floor(c), f = c - i;
+  float first = 9.0, second = 9.0;
+  for (int y = -1; y <= 1; ++y)
+    for (int x = -1; x <= 1; ++x) {
+      vec2 o = vec2(x, y);
+      vec2 d = o + 0.9 * vec2(hash(vec3(i + o, 1.0)), hash(vec3(i + o, 9.0))) - f;
+      float d2 = dot(d, d);
+      second = min(second, max(first, d2));
+      first = min(first, d2);
+    }
+  return 1.0 - smoothstep(0.0, 0.45, sqrt(second) - sqrt(first));
+}
 vec4 behind(vec2 pixel) { return texelFetch(normal_depth, ivec2(clamp(pixel, vec2(0.5), picture - 0.5)), 0); }
 vec2 pixel_of(vec3 p) {
   vec4 c = to_clip * vec4(p, 1);
@@ -274,15 +301,19 @@ void main() {
   float nv = clamp(dot(n, v), 0.03, 1.0), fresnel = 0.02 + 0.98 * pow(1.0 - nv, 5.0);
   float depth = dot(place - eye, forward), slant = max(0.05, -dot(v, forward));
 
-  // Through: follow the bent ray as far as the water seems deep, and take the picture there.
-  float deep = clamp((behind(gl_FragCoord.xy).w - depth) / slant, 0.0, 2.0);
-  vec3 bent = refract(-v, n, 1.0 / 1.333);
-  vec2 at = pixel_of(place + bent * deep * 0.8);
+  // Through: ripples bend what is behind. How much nearer flat water makes its ground look
+  // is left out, since the picture does not have what that would uncover.
+  float deep = clamp((behind(gl_FragCoord.xy).w - depth) / slant, 0.0, 1.0);
+  vec3 calm = normalize(mix(v, vec3(0, 1, 0), smoothstep(0.5, 0.85, n.y)));
+  vec2 shift = pixel_of(place + refract(-v, n, 0.75) * deep) - pixel_of(place + refract(-v, calm, 0.75) * deep);
+  float most = 0.07 * picture.y;
+  shift *= most / (most + length(shift));
+  vec2 at = clamp(gl_FragCoord.xy + shift, vec2(0.5), picture - 0.5);
   float there = behind(at).w;
   if (there < depth) { at = gl_FragCoord.xy; there = behind(at).w; }
   float way = clamp((there - depth) / slant, 0.0, 3.0);
   vec3 left = pow(max(outside_color, vec3(0.01)), vec3(way / 0.1));
-  vec3 through = texture(scene, at / picture).rgb * left + outside_color * (1.0 - left) * 0.16 * (sky_color + 0.5 * key_color);
+  vec3 through = texture(scene, at / picture).rgb * left + outside_color * (1.0 - left) * 0.08 * (sky_color + 0.5 * key_color);
 
   // Mirrored: what of the solid picture the ray meets, else the studio.
   vec3 r = reflect(-v, n);
@@ -306,12 +337,18 @@ void main() {
   mirror = mix(mirror, met, found);
   vec3 result = mix(through, mirror, fresnel);
 
-  // Foam: bubbles break up where there is little of it and close where there is much.
-  float bubbles = 0.55 * noise(place * 60.0) + 0.3 * noise(place * 140.0) + 0.15 * noise(place * 330.0);
-  float foam = smoothstep(0.0, 0.28, side - 0.75 * bubbles) * clamp(1.6 * side, 0.0, 1.0);
+  // Foam: a lace of bubbles, closed where there is much.
+  float lace = 0.0;
+  if (side > 0.01) {
+    vec2 ground = place.xz + 0.7 * place.y;
+    ground += 0.012 * vec2(noise(place * 45.0), noise(place.zxy * 45.0 + 7.0));
+    lace = 0.6 * bubbles(ground * 42.0) + 0.4 * bubbles(ground * 115.0 + 3.7);
+  }
+  float thin = 1.0 - side;
+  float foam = smoothstep(thin - 0.12, thin + 0.30, lace + 0.25 * side) * smoothstep(0.0, 0.15, side);
   float wrap = clamp((dot(n, key_direction) + 0.3) / 1.3, 0.0, 1.0);
-  vec3 white = vec3(0.82, 0.86, 0.88) * (0.75 + 0.35 * bubbles) * (key_color * wrap * 0.75 + sky_color);
-  light = vec4(mix(result, white, 0.92 * foam), 1);
+  vec3 white = vec3(0.72, 0.76, 0.78) * (0.62 + 0.45 * lace) * (key_color * wrap * 0.8 + sky_color);
+  light = vec4(mix(result, white, 0.88 * foam), 1);
 })";
 
 }  // namespace
@@ -320,7 +357,7 @@ std::string studio_functions() { return kStudio; }
 std::string streak_vertex_shader() { return std::string(kVersion) + kStreakVertex; }
 std::string streak_fragment_shader() { return kVersion + place_of_pixel() + kStreak; }
 std::string sprite_vertex_shader() { return std::string(kVersion) + kSpriteVertex; }
-std::string puff_fragment_shader() { return kVersion + place_of_pixel() + kStudio + kPuff; }
+std::string puff_fragment_shader() { return kVersion + place_of_pixel() + kPuff; }
 std::string drop_fragment_shader() { return kVersion + place_of_pixel() + kStudio + kDrop; }
 std::string narrow_fragment_shader() { return std::string(kVersion) + kNarrow; }
 std::string widen_fragment_shader() { return std::string(kVersion) + kWiden; }

@@ -15,6 +15,7 @@ namespace hooke::render {
 namespace {
 
 constexpr int kPuffSize = 128, kPuffPatterns = 4;
+constexpr int kPuffUnit = 2;
 constexpr int kShadeCells = 96;
 
 struct Streak {
@@ -114,6 +115,7 @@ std::vector<float> picture_pixels(const Image& image) {
 
 GLuint upload_picture(GLuint into, int width, int height, const std::vector<float>& pixels) {
   if (!into) glGenTextures(1, &into);
+  glActiveTexture(GL_TEXTURE0 + kPuffUnit);  // other units are in use
   glBindTexture(GL_TEXTURE_2D, into);
   glTexImage2D(GL_TEXTURE_2D, 0, GL_RGBA16F, width, height, 0, GL_RGBA, GL_FLOAT, pixels.data());
   for (const GLenum which : {GL_TEXTURE_MIN_FILTER, GL_TEXTURE_MAG_FILTER})
@@ -171,8 +173,7 @@ void shade_smoke(std::vector<SortedSprite>& sprites, const Vec3& towards_key) {
 
 Vec3 lamp_light(const std::vector<Lamp>& lamps, const Vec3& place, double radius) {
   Vec3 sum(0, 0, 0);
-  for (const Lamp& lamp : lamps)
-    sum += lamp.power / ((lamp.place - place).squaredNorm() + lamp.size * lamp.size + radius * radius);
+  for (const Lamp& lamp : lamps) sum += lamp.power * lamp.falloff(place, radius);
   return 0.25 * sum;  // from one side, scattered to all
 }
 
@@ -273,8 +274,17 @@ bool Effects::draw_veil(const Frame& frame, std::span<const Particles> particles
     program->set("near", frame.view.near);
     program->set("least_radius", 0.7 * frame.supersample);
     program->set("patterns", kPuffPatterns);
+    program->set("puffs", program == &puffs_ ? 1 : 0);
     program->set_texture("scene", 1, GL_TEXTURE_2D, scene);
   }
+  const auto in_picture = [&](const Vec3& v) {
+    return Vec3(v.dot(frame.view.ray_right.normalized()), v.dot(frame.view.ray_up.normalized()),
+                -v.dot(frame.view.forward));
+  };
+  puffs_.use();
+  puffs_.set("key_direction", in_picture(frame.look.key_direction.normalized()));
+  puffs_.set("rim_direction", in_picture(frame.look.rim_direction.normalized()));
+  puffs_.set("above", in_picture(Vec3::UnitY()));
   std::vector<std::pair<const Image*, GLuint>> pictures;
   for (std::size_t first = 0, last; first < sorted.size(); first = last) {
     for (last = first; last < sorted.size() && sorted[last].kind == sorted[first].kind &&
@@ -296,7 +306,7 @@ bool Effects::draw_veil(const Frame& frame, std::span<const Particles> particles
       }
       puffs_.set("pictured", image ? 1 : 0);
       puffs_.set("patterns", image ? 1 : kPuffPatterns);
-      puffs_.set_texture("puff_map", 2, GL_TEXTURE_2D, map);
+      puffs_.set_texture("puff_map", kPuffUnit, GL_TEXTURE_2D, map);
     }
     describe_stream(kSpriteSizes, sizeof(Sprite), first);
     glDrawArraysInstanced(GL_TRIANGLE_STRIP, 0, 4, GLsizei(last - first));

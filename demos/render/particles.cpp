@@ -91,6 +91,13 @@ Vec3 black_body(double kelvin) {
   return (to_srgb * black_body_xyz(kelvin) / reference).cwiseMax(0);
 }
 
+// Far away the mean of 1 / distance² is (1 + size² / (3 distance²)) / distance²; in the
+// middle of a ball or a Gaussian cloud 1.8 or 3 / size².
+double Lamp::falloff(const Vec3& from, double least) const {
+  const double d2 = (place - from).squaredNorm(), s2 = size * size + least * least;
+  return (d2 + s2) / (d2 * d2 + s2 * (0.667 * d2 + 0.42 * s2));
+}
+
 // Means by energy (Lloyd's iteration) from starts that lie far apart. Which spark belongs
 // to which lamp may jump from frame to frame; what the lamps give together does not, since
 // each is as wide as its sparks are.

@@ -50,8 +50,12 @@ Vec3 black_body(double kelvin);
 /// A small light that stands for many sparks.
 struct Lamp {
   Vec3 place{0, 0, 0};  ///< [m]
-  Vec3 power{0, 0, 0};  ///< [m²]; a white surface at distance d facing it is power / d² bright
+  Vec3 power{0, 0, 0};  ///< [m²]; a white surface far away that faces it is power / distance² bright
   double size = 0;      ///< [m], how far its sparks are from `place` (root of the mean square)
+
+  /// The mean of 1 / distance² from sparks spread by `size` [1/m²]: exact to second order
+  /// far away, bounded within. `least` [m] widens the lamp.
+  double falloff(const Vec3& from, double least = 0) const;
 };
 
 /// At most `most` lamps that together give the light of all sparks. The same sparks give

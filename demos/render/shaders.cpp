@@ -354,8 +354,9 @@ vec3 lamp_light(vec3 n) {
   vec3 sum = vec3(0);
   for (int i = 0; i < lamps; ++i) {
     vec3 d = lamp_place[i].xyz - place;
-    float d2 = dot(d, d) + lamp_place[i].w;
-    sum += lamp_power[i] * (max(0.0, dot(n, d)) * inversesqrt(d2) / d2);
+    float d2 = dot(d, d), s2 = lamp_place[i].w;
+    float falloff = (d2 + s2) / (d2 * d2 + s2 * (0.667 * d2 + 0.42 * s2));  // as in Lamp::falloff
+    sum += lamp_power[i] * (max(0.0, dot(n, d)) * inversesqrt(d2 + 0.3 * s2) * falloff);
   }
   return sum;
 }
@@ -443,13 +444,14 @@ void main() {
   vec3 dry_n = n;
   float blotch = 0.6 * grain(place * 7.0) + 0.4 * grain(place * 19.0) - 0.5;
   float layer = grain(vec3(place.x * 2.0, place.y * 34.0 + 3.0 * blotch, place.z * 2.0)) - 0.5;
-  float coarse = resolved(90.0 * footprint), fine = resolved(420.0 * footprint);
+  float coarse = 1.0 - smoothstep(0.15, 0.8, 90.0 * footprint), fine = 1.0 - smoothstep(0.15, 0.8, 300.0 * footprint);
   vec3 e = vec3(0.004, 0, 0);
   float g0 = grain(place * 90.0);
   vec3 slope = vec3(grain((place + e.xyy) * 90.0), grain((place + e.yxy) * 90.0), grain((place + e.yyx) * 90.0)) - g0;
-  float speck = grain(place * 420.0);
+  float speck = grain(place * 300.0);
+  float pit = smoothstep(0.66, 0.90, 0.6 * grain(place * 130.0 + 5.0) + 0.4 * grain(place * 47.0)) * (1.0 - smoothstep(0.15, 0.8, 130.0 * footprint));
   float wet = clamp(wetness * side, 0.0, 1.0);
-  s.color *= 1.0 + 0.42 * blotch + 0.22 * layer + 0.30 * (g0 - 0.5) * coarse + 0.5 * (speck - 0.5) * fine;
+  s.color *= (1.0 + 0.40 * blotch + 0.30 * layer + 0.45 * (g0 - 0.5) * coarse + 0.6 * (speck - 0.5) * fine) * (1.0 - 0.4 * pit);
   s.color = mix(s.color, s.color * vec3(1.12, 0.98, 0.84), clamp(blotch * 1.5, 0.0, 1.0));
   slope -= n * dot(slope, n);
   n = normalize(n - slope * (0.55 * coarse * (1.0 - 0.7 * wet)));

@@ -236,7 +236,7 @@ Look workshop_for(const Camera& camera) {
 Material water() {
   Material material;
   material.kind = Material::Kind::Water;
-  material.color = {0.72, 0.90, 0.92};
+  material.color = {0.80, 0.93, 0.93};
   material.roughness = 0.05;
   return material;
 }
