@@ -1,7 +1,7 @@
 // Loops that the compiler turns into vector code, and vectors of 32 bytes, one clone an instruction set. Only
 // IEEE operations on one lane, contracted where there is multiply-add: all instruction sets that have it give
 // the same bits, and so do those that have not.
-#include <hooke/softbody/clones.hpp>
+#include <hooke/clones.hpp>
 #include <hooke/softbody/filtered_kernels.hpp>
 
 #include <cmath>

@@ -1,6 +1,6 @@
 // Plain loops that the compiler turns into vector code, one clone an instruction set. Only
 // IEEE operations on one lane and no contraction: every clone gives the same bits.
-#include <hooke/softbody/clones.hpp>
+#include <hooke/clones.hpp>
 #include <hooke/softbody/kernels.hpp>
 
 #include <algorithm>

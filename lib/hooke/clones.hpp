@@ -1,4 +1,4 @@
-// Loops that are compiled once for each instruction set and chosen at run time. Internal to hooke::softbody
+// Loops that are compiled once for each instruction set and chosen at run time. Internal to the libraries
 // and not installed.
 #pragma once
 
