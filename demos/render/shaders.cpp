@@ -464,8 +464,10 @@ void main() {
   vec3 scratch = cross(n, abs(n.y) < 0.97 ? vec3(0, 1, 0) : vec3(1, 0, 0));
   scratch = normalize(scratch);
   vec3 across = cross(n, scratch);
-  float line = noise(vec2(dot(place, across) * 900.0, dot(place, scratch) * 14.0)) - 0.5;
-  line *= resolved(900.0 * 2.0 * dot(place - eye, forward) * length(ray_up) / picture.y);
+  float footprint = 2.0 * dot(place - eye, forward) * length(ray_up) / picture.y;
+  vec2 c = vec2(dot(place, across), dot(place, scratch));
+  float line = (noise(c * vec2(900, 14)) - 0.5) * (1.0 - smoothstep(0.15, 0.8, 900.0 * footprint)) +
+               (noise(c * vec2(240, 5)) - 0.5) * (1.0 - smoothstep(0.15, 0.8, 240.0 * footprint));
   n = normalize(n + across * 0.10 * line);
   vec3 mirror = vec3(0);
   for (int i = -3; i <= 3; ++i) {
@@ -473,7 +475,7 @@ void main() {
     mirror += (4.0 - abs(float(i))) / 16.0 * mirrored(reflect(-v, m), 0.10 + 0.5 * s.rough);
   }
   vec3 shine = s.color + (1.0 - s.color) * pow(1.0 - nv, 5.0);
-  vec3 result = shine * mirror * mix(0.35, 1.0, 0.5 * (seen.x + seen.z)) * (1.0 + 0.25 * line);
+  vec3 result = shine * mirror * mix(0.35, 1.0, 0.5 * (seen.x + seen.z)) * (1.0 + 0.30 * line);
 #if LAMPS
   result += shine * (2.0 * lamp_gloss(n, v, 0.5 * s.rough + 0.08) + 0.15 * lamp_light(n));
 #endif

@@ -172,13 +172,14 @@ TEST(Lamps, GiveTheLightOfAllSparks) {
 
 TEST(Sparks, GiveAsMuchLightHoweverThinLongOrFineTheyAreDrawn) {
   // The same area times radiance each time; at 4 m a pixel is 12 mm in the small picture.
-  const auto light_of = [](double radius, double speed, int scale) {
+  Stage small(kWidth, kHeight, 1, dark()), large(2 * kWidth, 2 * kHeight, 1, dark());
+  const auto light_of = [&](double radius, double speed, int scale) {
     Cloud cloud;
     const double radiance = 0.9 * std::pow(0.02 / radius, 2) * (speed > 0 ? 6 : 1);
     cloud.add({0.1, 1.02, 0}, {speed, 0.37 * speed, 0}, Vec3(radiance, radiance, radiance), radius);
     const Particles sparks = cloud.as(Particles::Kind::Sparks);
-    Stage stage(kWidth * scale, kHeight * scale, 1, dark());
-    return whole_light(stage.draw({}, std::span(&sparks, 1), kFront)) / (scale * scale * (speed > 0 ? 6 : 1));
+    return whole_light((scale == 1 ? small : large).draw({}, std::span(&sparks, 1), kFront)) /
+           (scale * scale * (speed > 0 ? 6 : 1));
   };
   const double pixel = 2 * 4 * std::tan(15 * std::numbers::pi / 180) / kHeight;
   const double expected = 0.9 * std::numbers::pi * std::pow(0.02 / pixel, 2);
@@ -188,6 +189,25 @@ TEST(Sparks, GiveAsMuchLightHoweverThinLongOrFineTheyAreDrawn) {
         EXPECT_NEAR(light_of(radius, speed, scale) / expected, 1, 0.04)
             << radius << " m, " << speed << " m/s, x" << scale;
   EXPECT_NEAR(light_of(0.03, 0, 1) / expected, 1, 0.04) << "at rest";
+}
+
+TEST(Sparks, BehindTheCameraAreNotSeenAndThoseThatPassItDoNoHarm) {
+  Look look = dark();
+  look.bloom = 0.2;
+  Stage stage(kWidth, kHeight, 1, look);
+  const Image nothing = stage.draw({}, kFront);
+  Cloud cloud;
+  cloud.add({0.2, 1, 4.5}, {0, 0, 10}, {1000, 1000, 1000}, 0.002);
+  const Particles behind = cloud.as(Particles::Kind::Sparks);
+  EXPECT_EQ(stage.draw({}, std::span(&behind, 1), kFront).rgb, nothing.rgb);
+  cloud = {};
+  cloud.add({0.1, 1.1, 4.2}, {0.1, 0.1, 100}, {1000, 1000, 1000}, 0.002);  // flew past the eye
+  const Particles past = cloud.as(Particles::Kind::Sparks);
+  const Image streak = stage.draw({}, std::span(&past, 1), kFront);
+  int lit = 0;
+  for (std::size_t i = 1; i < streak.rgb.size(); i += 3) lit += streak.rgb[i] > nothing.rgb[i] + 10;
+  EXPECT_GT(lit, 0);
+  EXPECT_LT(lit, kWidth * kHeight / 4);
 }
 
 TEST(Sparks, AYoungSparkHasAShortStreakThatIsAsBright) {
