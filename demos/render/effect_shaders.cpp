@@ -184,15 +184,10 @@ in vec2 local;
 uniform sampler2D scene;
 uniform mat4 to_clip;
 out vec4 veil;
-void main() {
-  float rim = length(local);
-  vec2 inside = local * min(1.0, 0.985 / max(rim, 1e-4));
-  float bulge = sqrt(max(0.0, 1.0 - dot(inside, inside)));
-  vec2 lean = vec2(inside.x * shape.w / shape.z, inside.y);
-  lean = lean.x * axes.xy + lean.y * vec2(-axes.y, axes.x);
-  vec3 v = normalize(eye - middle);
+// The light that comes to the eye from the place `lean` (right, up; 1 at the rim) of the ball.
+vec3 light_at(vec2 lean, vec3 v, float spread) {
+  float bulge = sqrt(max(0.0, 1.0 - dot(lean, lean)));
   vec3 n = normalize(lean.x * normalize(ray_right) + lean.y * normalize(ray_up) + bulge * v);
-  float depth = shape.x - bulge * shape.y;
   float nv = clamp(dot(n, v), 0.02, 1.0), fresnel = 0.02 + 0.98 * pow(1.0 - nv, 5.0);
   vec3 within = refract(-v, n, 0.75), out_n = n - 2.0 * dot(n, within) * within;
   vec3 beyond = refract(within, -out_n, 1.333);
@@ -201,11 +196,27 @@ void main() {
   vec4 clip = to_clip * vec4(middle + 1.2 * beyond, 1);
   vec2 at = clip.xy / max(clip.w, 1e-3) * 0.5 + 0.5, within_picture = min(at, 1.0 - at);
   float shown = clip.w > 0.05 ? clamp(20.0 * min(within_picture.x, within_picture.y), 0.0, 1.0) : 0.0;
-  vec3 through = mix(mirrored(beyond, 0.05), texture(scene, clamp(at, 0.0, 1.0)).rgb, shown);
-  vec3 light = mix(through * color.rgb * (1.0 - 0.35 * pow(rim, 6.0)), mirrored(reflect(-v, n), 0.05), fresnel) + lamp.rgb * 0.15;
+  vec3 through = mix(mirrored(beyond, spread), texture(scene, clamp(at, 0.0, 1.0)).rgb, shown);
+  vec3 light = mix(through * color.rgb * (1.0 - 0.35 * pow(1.0 - nv, 2.0)), mirrored(reflect(-v, n), spread), fresnel);
+  return min(light, 40.0);
+}
+void main() {
+  float rim = length(local);
+  vec2 inside = local * min(1.0, 0.985 / max(rim, 1e-4));
+  float depth = shape.x - sqrt(max(0.0, 1.0 - dot(inside, inside))) * shape.y;
+  vec3 v = normalize(eye - middle), light = vec3(0);
+  // Where a drop flew by, each place saw the whole width of it.
+  float smear = 1.0 - smoothstep(0.3, 0.7, shape.w / shape.z), half_width = sqrt(max(0.0, 0.97 - inside.y * inside.y));
+  int moments = smear > 0.0 ? 5 : 1;
+  for (int i = 0; i < moments; ++i) {
+    float moment = (2.0 * float(i) + 1.0) / float(moments) - 1.0;
+    vec2 lean = vec2(mix(inside.x, moment * half_width, smear), inside.y);
+    light += light_at(lean.x * axes.xy + lean.y * vec2(-axes.y, axes.x), v, 0.05 + 0.18 * smear);
+  }
+  light = light / float(moments) + lamp.rgb * 0.15;
   float seen = clamp(1.0 + (texelFetch(normal_depth, ivec2(gl_FragCoord.xy), 0).w - depth) / (0.25 * shape.y + 0.001 * depth), 0.0, 1.0);
   float hides = color.a * clamp((1.0 - rim) * shape.w + 0.5, 0.0, 1.0) * seen;
-  veil = vec4(min(light, 40.0) * hides, hides);
+  veil = vec4(light * hides, hides);
 })";
 
 // Down by half: five overlapping boxes (Jimenez, "Next Generation Post Processing in Call
