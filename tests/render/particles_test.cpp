@@ -183,11 +183,11 @@ TEST(Sparks, GiveAsMuchLightHoweverThinLongOrFineTheyAreDrawn) {
   };
   const double pixel = 2 * 4 * std::tan(15 * std::numbers::pi / 180) / kHeight;
   const double expected = 0.9 * std::numbers::pi * std::pow(0.02 / pixel, 2);
-  for (const double radius : {0.003, 0.03, 0.06})
-    for (const double speed : {10.0, 25.0})
-      for (const int scale : {1, 2})
-        EXPECT_NEAR(light_of(radius, speed, scale) / expected, 1, 0.04)
-            << radius << " m, " << speed << " m/s, x" << scale;
+  for (const double radius : {0.003, 0.03, 0.06}) {
+    EXPECT_NEAR(light_of(radius, 10, 1) / expected, 1, 0.04) << radius << " m";
+    EXPECT_NEAR(light_of(radius, 25, 1) / expected, 1, 0.04) << radius << " m, longer";
+    EXPECT_NEAR(light_of(radius, 10, 2) / expected, 1, 0.04) << radius << " m, finer";
+  }
   EXPECT_NEAR(light_of(0.03, 0, 1) / expected, 1, 0.04) << "at rest";
 }
 
