@@ -71,6 +71,12 @@ HWY_INLINE void reflect(D d, const Flight<S>& flight, const Plane<S>& p, int leg
       tell<S>(d, flight, p, leg, first, told, hn::Neg(along), hn::Sub(x0, hn::Mul(gap, n0)),
               hn::Sub(x1, hn::Mul(gap, n1)), hn::Sub(x2, hn::Mul(gap, n2)));
   }
+  // What rests does not creep: friction takes back the slip of the drift as well.
+  const auto slow = hn::And(comes, hn::Lt(hn::Neg(along), hn::Set(d, p.slow)));
+  const V back = hn::IfThenElseZero(slow, hn::Mul(rub, hn::Set(d, flight.legs[std::size_t(leg)].drift)));
+  x0 = hn::IfThenElse(slow, hn::Sub(x0, hn::Mul(back, t0)), x0);
+  x1 = hn::IfThenElse(slow, hn::Sub(x1, hn::Mul(back, t1)), x1);
+  x2 = hn::IfThenElse(slow, hn::Sub(x2, hn::Mul(back, t2)), x2);
   x0 = hn::IfThenElse(below, hn::Add(x0, hn::Mul(push, n0)), x0);
   x1 = hn::IfThenElse(below, hn::Add(x1, hn::Mul(push, n1)), x1);
   x2 = hn::IfThenElse(below, hn::Add(x2, hn::Mul(push, n2)), x2);
@@ -86,10 +92,15 @@ HWY_INLINE void rest(D d, const Plane<S>& p, M touching, V& v0, V& v1, V& v2) {
   const V r0 = hn::Sub(v0, hn::Set(d, p.wall[0])), r1 = hn::Sub(v1, hn::Set(d, p.wall[1])),
           r2 = hn::Sub(v2, hn::Set(d, p.wall[2]));
   const V along = dot<D>(r0, r1, r2, n0, n1, n2);
-  const auto stops = hn::And(touching, hn::And(hn::Lt(along, hn::Zero(d)), hn::Lt(hn::Neg(along), hn::Set(d, p.slow))));
-  v0 = hn::IfThenElse(stops, hn::Sub(v0, hn::Mul(along, n0)), v0);
-  v1 = hn::IfThenElse(stops, hn::Sub(v1, hn::Mul(along, n1)), v1);
-  v2 = hn::IfThenElse(stops, hn::Sub(v2, hn::Mul(along, n2)), v2);
+  const auto zero = hn::Zero(d), one = hn::Set(d, S(1));
+  const auto stops = hn::And(touching, hn::And(hn::Lt(along, zero), hn::Lt(hn::Neg(along), hn::Set(d, p.slow))));
+  const V t0 = hn::Sub(r0, hn::Mul(along, n0)), t1 = hn::Sub(r1, hn::Mul(along, n1)),
+          t2 = hn::Sub(r2, hn::Mul(along, n2));
+  const V slip = hn::Max(hn::Sqrt(dot<D>(t0, t1, t2, t0, t1, t2)), hn::Set(d, std::numeric_limits<S>::min()));
+  const V rub = hn::Min(one, hn::Div(hn::Mul(hn::Set(d, p.friction), hn::Neg(along)), slip));
+  v0 = hn::IfThenElse(stops, hn::Sub(hn::Sub(v0, hn::Mul(along, n0)), hn::Mul(rub, t0)), v0);
+  v1 = hn::IfThenElse(stops, hn::Sub(hn::Sub(v1, hn::Mul(along, n1)), hn::Mul(rub, t1)), v1);
+  v2 = hn::IfThenElse(stops, hn::Sub(hn::Sub(v2, hn::Mul(along, n2)), hn::Mul(rub, t2)), v2);
 }
 
 // A group's lanes: two vectors at a time, so that one computes while the other waits for its results.
@@ -165,10 +176,11 @@ HWY_INLINE void meet_planes(const Tile<S>& tile, const Flight<S>& flight, int le
 template <class S>
 HWY_INLINE void kick(const Kick<S>& kick, Group<Lanes<S>>& a, Group<Lanes<S>>& b) {
   const Lanes<S> d;
-  const auto keep = hn::Set(d, kick.keep);
+  const auto gain = hn::Set(d, kick.gain);
   const auto add0 = hn::Set(d, kick.add[0]), add1 = hn::Set(d, kick.add[1]), add2 = hn::Set(d, kick.add[2]);
-  a.v0 = hn::MulAdd(a.v0, keep, add0), a.v1 = hn::MulAdd(a.v1, keep, add1), a.v2 = hn::MulAdd(a.v2, keep, add2);
-  b.v0 = hn::MulAdd(b.v0, keep, add0), b.v1 = hn::MulAdd(b.v1, keep, add1), b.v2 = hn::MulAdd(b.v2, keep, add2);
+  a.v0 = hn::Add(a.v0, hn::MulAdd(a.v0, gain, add0)), b.v0 = hn::Add(b.v0, hn::MulAdd(b.v0, gain, add0));
+  a.v1 = hn::Add(a.v1, hn::MulAdd(a.v1, gain, add1)), b.v1 = hn::Add(b.v1, hn::MulAdd(b.v1, gain, add1));
+  a.v2 = hn::Add(a.v2, hn::MulAdd(a.v2, gain, add2)), b.v2 = hn::Add(b.v2, hn::MulAdd(b.v2, gain, add2));
 }
 
 // Returns the least that remains.
@@ -263,12 +275,13 @@ void reflect_lanes(const Tile<S>& tile, const Flight<S>& flight) {
 template <class S>
 void kick_lanes(const Tile<S>& tile, const Kick<S>& kick, const S* const a[3], S share) {
   const Lanes<S> d;
-  const auto keep = hn::Set(d, kick.keep), part = hn::Set(d, share);
+  const auto gain = hn::Set(d, kick.gain), part = hn::Set(d, share);
   for (int k = 0; k < 3; ++k) {
     const auto add = hn::Set(d, kick.add[k]);
     for (Index i = 0; i < tile.count; i += Index(hn::Lanes(d))) {
-      const auto v = hn::MulAdd(hn::LoadU(d, tile.v[k] + i), keep, add);
-      hn::StoreU(hn::MulAdd(part, hn::LoadU(d, a[k] + i), v), d, tile.v[k] + i);
+      const auto v = hn::LoadU(d, tile.v[k] + i);
+      const auto change = hn::MulAdd(part, hn::LoadU(d, a[k] + i), hn::MulAdd(v, gain, add));
+      hn::StoreU(hn::Add(v, change), d, tile.v[k] + i);
     }
   }
 }

@@ -19,10 +19,10 @@ struct Plane {
   S near;               ///< distance that counts as touching [m]
 };
 
-/// v ← keep v + add.
+/// v ← v + gain v + add: what drag leaves is not rounded to a factor near 1.
 template <class S>
 struct Kick {
-  S keep = 1, add[3] = {0, 0, 0};
+  S gain = 0, add[3] = {0, 0, 0};
 };
 
 /// A kick, then a drift x ← x + drift v that planes reflect.
@@ -66,7 +66,7 @@ Landing fly(const Tile<double>& tile, const Flight<double>& flight);
 void reflect(const Tile<float>& tile, const Flight<float>& flight);
 void reflect(const Tile<double>& tile, const Flight<double>& flight);
 
-/// v ← keep v + add + share a.
+/// v ← v + gain v + add + share a.
 void kick(const Tile<float>& tile, const Kick<float>& kick, const float* const a[3], float share);
 void kick(const Tile<double>& tile, const Kick<double>& kick, const double* const a[3], double share);
 

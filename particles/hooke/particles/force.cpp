@@ -168,7 +168,7 @@ std::array<S, 3> three(const Vec3& v) {
 }
 
 // RMS of one component of the curl above is about this, by sampling.
-constexpr double kCurlRms = 1.05;
+constexpr double kCurlRms = 0.712;
 
 }  // namespace
 

@@ -27,7 +27,7 @@ void set_row(Points<S>& p, Index i, const Vec3& value) {
   p.row(i) = value.transpose().array().template cast<S>();
 }
 
-// v ← keep v + add + share a over q seconds of dv/dt = acceleration + a - rate v: exact for constant a.
+// v ← v + gain v + add + share a over q seconds of dv/dt = acceleration + a - rate v: exact for constant a.
 template <class S>
 struct Push {
   Kick<S> kick;
@@ -38,7 +38,7 @@ Push<S> push_of(const typename Force<S>::Uniform& uniform, double q) {
   const double z = uniform.rate * q;
   const double share = z != 0 ? -std::expm1(-z) / uniform.rate : q;
   Push<S> push;
-  push.kick.keep = S(std::exp(-z));
+  push.kick.gain = S(std::expm1(-z));
   for (int k = 0; k < 3; ++k) push.kick.add[k] = S(share * uniform.acceleration[k]);
   push.share = S(share);
   return push;
@@ -125,7 +125,6 @@ struct ParticleSystem<S>::Worker {
   std::vector<Index> dying;  // tiles in which somebody's life is over
   Points<S> x, v;
   std::unique_ptr<Integrator<S>> integrator;
-  std::unique_ptr<Dynamics<S>> dynamics;
 
   explicit Worker(Index tile) {
     const std::size_t each = std::size_t(tile) + std::size_t(Tile<S>::kLanes);
@@ -144,8 +143,7 @@ template <class S, class Accelerate, class Solid>
 class TileDynamics final : public Dynamics<S> {
  public:
   TileDynamics(Accelerate accelerate, Solid* solid) : accelerate_(accelerate), solid_(solid) {}
-  void set(double inverse_mass, double rate, Index rows, const S* masses) {
-    rate_ = rate;
+  void set(double inverse_mass, Index rows, const S* masses) {
     inverse_mass_.resize(rows), mass_.resize(rows);
     for (Index i = 0; i < rows; ++i) {
       inverse_mass_[i] = masses ? masses[i] : S(inverse_mass);
@@ -167,15 +165,25 @@ class TileDynamics final : public Dynamics<S> {
   bool collides() const override { return solid_->collides(); }
   const Values<S>& mass() const override { return mass_; }
   const Values<S>& inverse_mass() const override { return inverse_mass_; }
-  void add_implicit_times(const Points<S>&, const Points<S>&, S h, bool, const Points<S>& d, Points<S>& out) override {
-    if (rate_ > 0) out += (h * S(rate_)) * (d.colwise() * mass_);
+  // h²K d + hD d by a difference of accelerations along (h d, d): forces need no derivatives of their own.
+  void add_implicit_times(const Points<S>& x, const Points<S>& v, S h, bool, const Points<S>& d,
+                          Points<S>& out) override {
+    const S size = d.abs().maxCoeff();
+    if (size == 0) return;
+    const S scale = std::max(v.abs().maxCoeff(), S(1e-3));
+    const S step = (sizeof(S) == 4 ? S(3e-3) : S(1e-6)) * scale / size;
+    x_ = x + (step * h) * d, v_ = v + step * d;
+    accelerate_(x_, v_, 0, ahead_);
+    x_ = x - (step * h) * d, v_ = v - step * d;
+    accelerate_(x_, v_, 0, behind_);
+    out -= (h / (2 * step)) * ((ahead_ - behind_).colwise() * mass_);
   }
 
  private:
   Accelerate accelerate_;
   Solid* solid_;
-  double rate_ = 0;
   Values<S> mass_, inverse_mass_;
+  Points<S> x_, v_, ahead_, behind_;
 };
 
 }  // namespace
@@ -549,7 +557,7 @@ void ParticleSystem<S>::integrate(Tile<S>& tile, Index first, Plan& plan, Worker
   const Index rows = Index(w.marks.size()) - Tile<S>::kLanes;
   Contact contact{&plan, &w, tile.count};
   Tiled dynamics(Accelerate{this, &plan, tile, first}, &contact);
-  dynamics.set(1 / same_mass_, plan.uniform.rate, rows, tile.inverse_mass);
+  dynamics.set(1 / same_mass_, rows, tile.inverse_mass);
   dynamics.uses_velocity_now = plan.velocity || plan.uniform.rate > 0;
   if (!w.integrator) w.integrator = std::make_unique<Integrator<S>>(*settings_.method);
   w.x.setZero(rows, 3), w.v.setZero(rows, 3);
@@ -769,6 +777,7 @@ void ParticleSystem<S>::simulate_tick(const Tick& tick) {
       for (Index k = first; k < std::min(first + settings_.tile, count_); ++k)
         if (remaining_[k] <= 0) dead_.push_back(k);
   }
+  std::sort(dead_.begin(), dead_.end());
   // A particle's impacts are in order; particles are not, where threads share them.
   std::stable_sort(events_.begin(), events_.end(),
                    [](const Event& a, const Event& b) { return a.particle < b.particle; });

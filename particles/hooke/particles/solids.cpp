@@ -347,7 +347,7 @@ bool Solids<S>::mark_planes(const Tile<S>& tile, int leg, unsigned char* marks) 
 // that is over.
 template <class S>
 void Solids<S>::meet(const Pose& pose, const Body& body, const Vec3& p, const Vec3& way, double done, double left,
-                     double drift, Meeting& first) const {
+                     double drift, bool pushed, Meeting& first) const {
   const Vec3 wall = drift > 0 ? Vec3(pose.move / drift) : Vec3(Vec3::Zero());
   const Vec3 start = p - done * pose.move, relative = way - left * wall;
   std::visit(
@@ -357,7 +357,8 @@ void Solids<S>::meet(const Pose& pose, const Body& body, const Vec3& p, const Ve
         Vec3 normal;
         if (gap < 0) {
           normal = normal_at(shape, start);
-          if (relative.dot(normal) >= -kNone * relative.norm() && gap > -1e-9) return;
+          // Out once a leg; what then leaves is on its way.
+          if (relative.dot(normal) >= -kNone * relative.norm() && (pushed || gap > -1e-9)) return;
           when = 0;
         } else {
           when = enter(shape, start, relative, rule_.radius);
@@ -401,7 +402,7 @@ void Solids<S>::resolve(const Tile<S>& tile, int leg, S drift, const S* const* f
     Vec3 p = from ? at<S>(from, i) : Vec3(end - double(drift) * v);
     Vec3 way = end - p;
     double left = h;
-    bool touched = false;
+    bool touched = false, pushed = false;
     for (int contact = 0; contact < kMostContacts; ++contact) {
       Meeting first;
       const double done = h > 0 ? 1 - left / h : 1;
@@ -409,7 +410,7 @@ void Solids<S>::resolve(const Tile<S>& tile, int leg, S drift, const S* const* f
         const Pose& pose_now = pose(body, leg);
         const Vec3 low = p.cwiseMin(p + way), high = p.cwiseMax(p + way);
         if ((high.array() < pose_now.lower.array()).any() || (low.array() > pose_now.upper.array()).any()) continue;
-        meet(pose_now, body, p, way, done, left, h, first);
+        meet(pose_now, body, p, way, done, left, h, pushed, first);
       }
       for (Index k = 0; k < plane_count_; ++k) {
         const Plane<S>& plane = planes(leg)[k];
@@ -428,7 +429,7 @@ void Solids<S>::resolve(const Tile<S>& tile, int leg, S drift, const S* const* f
       touched = true;
       p += first.when * way;
       left *= 1 - first.when;
-      if (first.depth > 0) p += std::min(first.depth, kPushSpeed * h) * first.normal;
+      if (first.depth > 0 && !pushed) p += std::min(first.depth, kPushSpeed * h) * first.normal, pushed = true;
       const Vec3 after = answer(first, v, h, i, leg, p, hits);
       v = after;
       way = left * v;
@@ -574,7 +575,12 @@ void Solids<S>::settle(const Tile<S>& tile, int leg, const unsigned char* marks)
             if (gap_to(shape, place, rule_.radius) > reach) return;
             const Vec3 n = normal_at(shape, place), wall = h > 0 ? Vec3(p.move / h) : Vec3(Vec3::Zero());
             const double approach = -(v - wall).dot(n);
-            if (approach > 0 && approach < slow(n, h)) v += approach * n, changed = true;
+            if (!(approach > 0 && approach < slow(n, h))) return;
+            const Vec3 slip = v - wall + approach * n;
+            const double speed = slip.norm();
+            v += approach * n;
+            if (speed > 0) v -= std::min(1.0, body.friction * approach / speed) * slip;
+            changed = true;
           },
           p.shape);
     }

@@ -75,7 +75,7 @@ class Solids {
   const Pose& pose(const Body& body, int leg) const { return poses_[body.pose + (body.moves ? std::size_t(leg) : 0)]; }
   double slow(const Vec3& normal, double drift) const;
   void meet(const Pose& pose, const Body& body, const Vec3& p, const Vec3& way, double done, double left, double drift,
-            Meeting& first) const;
+            bool pushed, Meeting& first) const;
   Vec3 answer(const Meeting& at, const Vec3& v, double drift, Index i, int leg, const Vec3& place,
               std::vector<Hit<S>>* hits) const;
 
