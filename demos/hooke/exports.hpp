@@ -1,0 +1,55 @@
+// What simulate writes beside the tables of all points: moving meshes, particles, and their counts.
+#pragma once
+
+#include <hooke/io/mesh_cache.hpp>
+#include <hooke/io/output_file.hpp>
+#include <scene/scene.hpp>
+
+#include <filesystem>
+#include <memory>
+#include <string>
+#include <vector>
+
+namespace hooke::command {
+
+/// Throws hooke::Error unless `format` is obj, ply, pc2, csv or vdb.
+void check_export_format(const std::string& format);
+
+/// Soft bodies as obj, ply or pc2; particles as one file a frame: ply, csv or vdb.
+class Exports {
+ public:
+  /// @param format empty: nothing is written
+  /// @throws hooke::Error where no body of the scene can be written so
+  Exports(const std::string& format, const scene::Scene& scene);
+
+  /// Begins the files. `folder` must exist. Throws hooke::OutputError, as do the others.
+  void open(const std::filesystem::path& folder);
+  void add();
+  void finish();
+  /// Bodies that are left out, a line each.
+  const std::string& left_out() const { return left_out_; }
+
+ private:
+  void write(const scene::SceneParticles& particles, const std::string& name) const;
+
+  const scene::Scene& scene_;
+  std::string format_, left_out_;
+  bool meshes_ = false, points_ = false;
+  std::filesystem::path folder_;
+  std::vector<std::string> names_;  // of particles, as file names
+  std::vector<std::unique_ptr<io::MeshCache>> caches_;
+  std::int64_t frame_ = 0;
+};
+
+/// particles.csv: a row a frame and particle system. What was written stays readable when a run is cut off.
+class CountsTable {
+ public:
+  explicit CountsTable(const std::filesystem::path& path);
+  void add(const scene::Scene& scene);
+  void finish() { file_.commit(); }
+
+ private:
+  io::OutputFile file_;
+};
+
+}  // namespace hooke::command
