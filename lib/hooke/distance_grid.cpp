@@ -7,34 +7,13 @@
 
 namespace hooke {
 
-namespace {
-
-// The cell of a point and the place in it, clamped to the grid.
-struct Cell {
-  std::size_t corner;
-  Vec3 part;
-  double away;  // from the grid [m]
-};
-
-Cell cell_of(const DistanceGrid& grid, const Vec3& point) {
-  const auto& n = grid.counts();
-  const Vec3 inside = point.cwiseMax(grid.lower()).cwiseMin(grid.upper());
-  const Vec3 place = (inside - grid.lower()) / grid.voxel();
-  int at[3];
-  Cell cell;
-  for (int k = 0; k < 3; ++k) {
-    at[k] = std::clamp(int(place[k]), 0, n[std::size_t(k)] - 2);
-    cell.part[k] = place[k] - at[k];
-  }
-  cell.corner = std::size_t(at[0]) + std::size_t(n[0]) * (std::size_t(at[1]) + std::size_t(n[1]) * std::size_t(at[2]));
-  cell.away = (point - inside).norm();
-  return cell;
-}
-
-}  // namespace
-
 DistanceGrid::DistanceGrid(const Vec3& lower, double voxel, const std::array<int, 3>& counts, std::vector<float> values)
-    : lower_(lower), voxel_(voxel), counts_(counts), values_(std::move(values)) {
+    : lower_(lower),
+      voxel_(voxel),
+      inverse_voxel_(1 / voxel),
+      last_(counts[0] - 1, counts[1] - 1, counts[2] - 1),
+      counts_(counts),
+      values_(std::move(values)) {
   if (!lower.allFinite()) throw std::invalid_argument("DistanceGrid: lower must be finite");
   if (!(voxel > 0) || !std::isfinite(voxel))
     throw std::invalid_argument("DistanceGrid: voxel must be positive, got " + std::to_string(voxel) + " m");
@@ -51,23 +30,35 @@ DistanceGrid::DistanceGrid(const Vec3& lower, double voxel, const std::array<int
     if (!std::isfinite(value)) throw std::invalid_argument("DistanceGrid: every value must be finite");
 }
 
-Vec3 DistanceGrid::upper() const { return lower_ + voxel_ * Vec3(counts_[0] - 1, counts_[1] - 1, counts_[2] - 1); }
+Vec3 DistanceGrid::upper() const { return lower_ + voxel_ * last_; }
 
 double DistanceGrid::away(const Vec3& point) const {
   return (lower_ - point).cwiseMax(point - upper()).cwiseMax(0.0).norm();
 }
 
 double DistanceGrid::distance(const Vec3& point) const {
-  const Cell cell = cell_of(*this, point);
+  Vec3 place = (point - lower_) * inverse_voxel_;
+  double beyond = 0;  // [m]
+  if (!((place.array() >= 0).all() && (place.array() <= last_.array()).all())) {
+    beyond = away(point);
+    place = place.cwiseMax(0.0).cwiseMin(last_);
+  }
+  std::size_t corner = 0, stride = 1;
+  for (int k = 0; k < 3; ++k) {
+    const int at = std::clamp(int(place[k]), 0, counts_[std::size_t(k)] - 2);  // also what is not a number
+    place[k] -= at;
+    corner += stride * std::size_t(at);
+    stride *= std::size_t(counts_[std::size_t(k)]);
+  }
   const std::size_t row = std::size_t(counts_[0]), layer = row * std::size_t(counts_[1]);
-  const float* v = values_.data() + cell.corner;
-  const auto along = [&](const float* p) { return p[0] + cell.part[0] * (double(p[1]) - p[0]); };
+  const float* v = values_.data() + corner;
+  const auto along = [&](const float* p) { return p[0] + place[0] * (double(p[1]) - p[0]); };
   const auto across = [&](const float* p) {
     const double low = along(p);
-    return low + cell.part[1] * (along(p + row) - low);
+    return low + place[1] * (along(p + row) - low);
   };
   const double low = across(v);
-  return low + cell.part[2] * (across(v + layer) - low) + cell.away;
+  return low + place[2] * (across(v + layer) - low) + beyond;
 }
 
 Vec3 DistanceGrid::normal(const Vec3& point) const {

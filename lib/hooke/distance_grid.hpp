@@ -34,7 +34,8 @@ class DistanceGrid {
 
  private:
   Vec3 lower_;
-  double voxel_;
+  double voxel_, inverse_voxel_;
+  Vec3 last_;  // the last sample's indices
   std::array<int, 3> counts_;
   std::vector<float> values_;
 };
