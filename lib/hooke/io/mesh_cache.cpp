@@ -1,11 +1,10 @@
 #include <hooke/io/mesh_cache.hpp>
 
 #include <hooke/error.hpp>
+#include <hooke/io/bytes.hpp>
 #include <hooke/io/output_file.hpp>
 
-#include <bit>
 #include <cstdint>
-#include <cstring>
 #include <optional>
 #include <stdexcept>
 #include <string>
@@ -13,28 +12,6 @@
 namespace hooke::io {
 
 namespace {
-
-// Bytes as they go into a little-endian file.
-class Bytes {
- public:
-  void add(std::uint32_t value) {
-    for (int shift = 0; shift < 32; shift += 8) bytes_.push_back(std::byte(value >> shift & 0xff));
-  }
-  void add(float value) { add(std::bit_cast<std::uint32_t>(value)); }
-  void add(std::uint8_t value) { bytes_.push_back(std::byte(value)); }
-  void add(std::string_view text) {
-    for (const char c : text) bytes_.push_back(std::byte(c));
-  }
-  void add(const Points<double>& points) {
-    bytes_.reserve(bytes_.size() + std::size_t(points.size()) * 4);
-    for (Index i = 0; i < points.rows(); ++i)
-      for (int k = 0; k < 3; ++k) add(float(points(i, k)));
-  }
-  operator std::span<const std::byte>() const { return bytes_; }
-
- private:
-  std::vector<std::byte> bytes_;
-};
 
 class Sequence final : public MeshCache {
  public:
