@@ -34,6 +34,22 @@ double worst_stretch(const Scene& scene) {
   return worst;
 }
 
+double worst_penetration(const Scene& scene) {
+  double worst = 0;
+  for (const Collider& collider : scene.world.colliders()) {
+    std::vector<Shape> shapes = collider.shapes;
+    if (collider.motion) collider.motion(scene.world.time(), shapes);
+    for (const SceneBody& body : scene.bodies) {
+      const Points<double> x = body.body->positions();
+      for (Index i = 0; i < x.rows(); ++i)
+        for (const Shape& shape : shapes)
+          if (!body.held[std::size_t(i)])
+            worst = std::max(worst, body.thickness - signed_distance(shape, Vec3(x.row(i).matrix().transpose())));
+    }
+  }
+  return worst;
+}
+
 CapeFigures::CapeFigures(const Scene& scene, std::size_t body)
     : body_(body),
       name_(scene.bodies[body].body->name()),

@@ -15,6 +15,10 @@ double worst_stretch(const SceneBody& body);
 /// … of all bodies.
 double worst_stretch(const Scene& scene);
 
+/// How deep the deepest point that is not held is inside a collider's surface, thickened by its body's thickness [m];
+/// 0 where none is. Colliders that are functions do not count. Cost: points × shapes.
+double worst_penetration(const Scene& scene);
+
 /// Figures of one cape over the shown time.
 class CapeFigures {
  public:
