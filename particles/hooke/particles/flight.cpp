@@ -226,7 +226,7 @@ Landing fly_lanes(const Tile<S>& tile, const Flight<S>& flight) {
   };
   for (Index i = 0; i < tile.count; i += 2 * lanes) {
     Group<Lanes<S>> a = load(i), b = load(i + lanes);
-    // Six streams are more than the processor's own prefetchers follow well.
+    // Seven streams are more than the processor's own prefetchers follow well.
     if (ages) __builtin_prefetch(tile.remaining + i, 1);
     for (int k = 0; k < 3; ++k)
       __builtin_prefetch(tile.x[k] + i + kAhead, 1), __builtin_prefetch(tile.v[k] + i + kAhead, 1);
@@ -246,10 +246,71 @@ Landing fly_lanes(const Tile<S>& tile, const Flight<S>& flight) {
   return {died, hn::GetLane(hn::SumOfLanes(d, sum)) == 0};
 }
 
+// One step a tick is bound by memory: here all constants stay in registers, and one vector at a time is enough.
+template <Planes kPlanes, class S>
+Landing fly_once(const Tile<S>& tile, const Flight<S>& flight) {
+  const Lanes<S> d;
+  const Index lanes = Index(hn::Lanes(d));
+  const Kick<S>&k = flight.legs[0].kick, &e = *flight.last;
+  const auto gain = hn::Set(d, k.gain), end_gain = hn::Set(d, e.gain), drift = hn::Set(d, flight.legs[0].drift);
+  const auto add0 = hn::Set(d, k.add[0]), add1 = hn::Set(d, k.add[1]), add2 = hn::Set(d, k.add[2]);
+  const auto end0 = hn::Set(d, e.add[0]), end1 = hn::Set(d, e.add[1]), end2 = hn::Set(d, e.add[2]);
+  const bool ages = tile.remaining && flight.ageing != 0;
+  const auto passed = hn::Set(d, flight.ageing), most = hn::Set(d, std::numeric_limits<S>::max());
+  const S offset = kPlanes == Planes::Floor ? flight.planes->offset : S(0);
+  const S near = kPlanes == Planes::Floor ? flight.planes->near : S(0);
+  const auto touch = hn::Set(d, offset + near);
+  S *const px = tile.x[0], *const py = tile.x[1], *const pz = tile.x[2];
+  S *const qx = tile.v[0], *const qy = tile.v[1], *const qz = tile.v[2];
+  S* const life = tile.remaining;
+  auto sum = hn::Zero(d), least = most;
+  for (Index i = 0; i < tile.count; i += lanes) {
+    Group<Lanes<S>> g{hn::LoadU(d, px + i), hn::LoadU(d, py + i), hn::LoadU(d, pz + i),
+                      hn::LoadU(d, qx + i), hn::LoadU(d, qy + i), hn::LoadU(d, qz + i)};
+    if ((std::size_t(i) * sizeof(S)) % 64 == 0) {
+      __builtin_prefetch(px + i + kAhead, 1), __builtin_prefetch(py + i + kAhead, 1),
+          __builtin_prefetch(pz + i + kAhead, 1);
+      __builtin_prefetch(qx + i + kAhead, 1), __builtin_prefetch(qy + i + kAhead, 1),
+          __builtin_prefetch(qz + i + kAhead, 1);
+    }
+    g.v0 = hn::Add(g.v0, hn::MulAdd(g.v0, gain, add0));
+    g.v1 = hn::Add(g.v1, hn::MulAdd(g.v1, gain, add1));
+    g.v2 = hn::Add(g.v2, hn::MulAdd(g.v2, gain, add2));
+    g.x0 = hn::MulAdd(drift, g.v0, g.x0), g.x1 = hn::MulAdd(drift, g.v1, g.x1), g.x2 = hn::MulAdd(drift, g.v2, g.x2);
+    bool met = false;
+    if constexpr (kPlanes == Planes::Floor) {
+      met = !hn::AllFalse(d, hn::Lt(g.x1, touch));
+      if (HWY_UNLIKELY(met)) meet<S>(tile, flight, 0, i, *flight.planes, g);
+    }
+    g.v0 = hn::Add(g.v0, hn::MulAdd(g.v0, end_gain, end0));
+    g.v1 = hn::Add(g.v1, hn::MulAdd(g.v1, end_gain, end1));
+    g.v2 = hn::Add(g.v2, hn::MulAdd(g.v2, end_gain, end2));
+    if (HWY_UNLIKELY(met) && flight.settles) meet<S>(tile, flight, -1, i, *flight.planes, g);
+    hn::StoreU(g.x0, d, px + i), hn::StoreU(g.x1, d, py + i), hn::StoreU(g.x2, d, pz + i);
+    hn::StoreU(g.v0, d, qx + i), hn::StoreU(g.v1, d, qy + i), hn::StoreU(g.v2, d, qz + i);
+    auto part = hn::Add(hn::Add(hn::Add(g.x0, g.x1), hn::Add(g.x2, g.v0)), hn::Add(g.v1, g.v2));
+    if (HWY_UNLIKELY(tile.count - i < lanes))
+      part = hn::IfThenElseZero(hn::FirstN(d, std::size_t(tile.count - i)), part);
+    sum = hn::MulAdd(part, hn::Zero(d), sum);
+    if (ages) {
+      auto left = hn::Sub(hn::LoadU(d, life + i), passed);
+      hn::StoreU(left, d, life + i);
+      if (HWY_UNLIKELY(tile.count - i < lanes))
+        left = hn::IfThenElse(hn::FirstN(d, std::size_t(tile.count - i)), left, most);
+      least = hn::Min(least, left);
+    }
+  }
+  return {hn::GetLane(hn::MinOfLanes(d, least)) <= 0, hn::GetLane(hn::SumOfLanes(d, sum)) == 0};
+}
+
 template <class S>
 Landing fly_any(const Tile<S>& tile, const Flight<S>& flight) {
+  const bool once = flight.legs.size() == 1 && flight.last,
+             floor = flight.plane_count == 1 && flight.planes->normal[1] == 1;
+  if (once && flight.plane_count == 0) return fly_once<Planes::None>(tile, flight);
+  if (once && floor) return fly_once<Planes::Floor>(tile, flight);
   if (flight.plane_count == 0) return fly_lanes<Planes::None>(tile, flight);
-  if (flight.plane_count == 1 && flight.planes->normal[1] == 1) return fly_lanes<Planes::Floor>(tile, flight);
+  if (floor) return fly_lanes<Planes::Floor>(tile, flight);
   return fly_lanes<Planes::Many>(tile, flight);
 }
 
