@@ -298,6 +298,23 @@ void Vortex<S>::add_velocity(const Tile<S>& tile, const Vec3& origin, double, S*
 }
 
 template <class S>
+GridFlow<S>::GridFlow(std::shared_ptr<const VelocityGrid> grid, const Vec3& offset, double scale)
+    : grid_(std::move(grid)), offset_(offset), scale_(scale) {
+  if (!grid_) throw std::invalid_argument("GridFlow: needs a grid");
+  check(offset, "GridFlow: offset");
+  check(std::isfinite(scale), "GridFlow: scale", "finite", scale);
+}
+
+template <class S>
+void GridFlow<S>::add_velocity(const Tile<S>& tile, const Vec3& origin, double, S* const u[3]) const {
+  for (Index i = 0; i < tile.count; ++i) {
+    const Vec3 x(double(tile.x[0][i]), double(tile.x[1][i]), double(tile.x[2][i]));
+    const Vec3 velocity = scale_ * grid_->velocity(origin + x - offset_);
+    for (int k = 0; k < 3; ++k) u[k][i] += S(velocity[k]);
+  }
+}
+
+template <class S>
 Repulsion<S>::Repulsion(double stiffness, double distance) : stiffness_(stiffness), distance_(distance) {
   check(stiffness >= 0 && std::isfinite(stiffness), "Repulsion: stiffness", "0 or more", stiffness);
   check(distance > 0 && std::isfinite(distance), "Repulsion: distance", "positive", distance);
@@ -371,6 +388,7 @@ void Repulsion<S>::add_acceleration(const Tile<S>& tile, Index first, const Vec3
   template class FlowDrag<S>;      \
   template class CurlNoise<S>;     \
   template class Vortex<S>;        \
+  template class GridFlow<S>;      \
   template class Repulsion<S>;
 HOOKE_FORCES(float)
 HOOKE_FORCES(double)

@@ -3,6 +3,7 @@
 
 #include <hooke/particles/random.hpp>
 #include <hooke/particles/tile.hpp>
+#include <hooke/velocity_grid.hpp>
 
 #include <functional>
 #include <memory>
@@ -137,6 +138,20 @@ class Vortex final : public Flow<S> {
  private:
   Vec3 place_, axis_;
   double circulation_, core_, updraught_;
+};
+
+/// A sampled velocity, trilinear, 0 outside of its grid: what hooke::vdb reads from a volume file.
+template <class S>
+class GridFlow final : public Flow<S> {
+ public:
+  /// @param offset where the grid's zero is in the world [m]  @param scale times the samples
+  explicit GridFlow(std::shared_ptr<const VelocityGrid> grid, const Vec3& offset = Vec3::Zero(), double scale = 1);
+  void add_velocity(const Tile<S>& tile, const Vec3& origin, double t, S* const u[3]) const override;
+
+ private:
+  std::shared_ptr<const VelocityGrid> grid_;
+  Vec3 offset_;
+  double scale_;
 };
 
 /// Pushes particles apart that are closer than `distance`: a = stiffness (distance - |d|) d/|d|, equal and opposite for
