@@ -2,6 +2,8 @@
 // What it shows and how to read it: docs/benchmarks.md.
 //
 //   speed_bench [--quick] [--out FOLDER] [CASE...]    CASE: kernel accuracy threads size features filtered
+//                                                   particles particle-modules
+#include "particles.hpp"
 #include "rounds.hpp"
 #include "sheet.hpp"
 #include "table.hpp"
@@ -515,8 +517,15 @@ struct NamedCase {
   const char* name;
   Table (*measure)(const Effort&);
 };
-constexpr NamedCase kCases[] = {{"kernel", kernel}, {"accuracy", accuracy}, {"threads", threads},
-                                {"size", size},     {"features", features}, {"filtered", filtered}};
+constexpr NamedCase kCases[] = {
+    {"kernel", kernel},
+    {"accuracy", accuracy},
+    {"threads", threads},
+    {"size", size},
+    {"features", features},
+    {"filtered", filtered},
+    {"particles", [](const Effort& effort) { return particle_pipeline(effort.quick); }},
+    {"particle-modules", [](const Effort& effort) { return particle_modules(effort.quick); }}};
 
 int main(int argc, char** argv) {
   Effort effort;

@@ -46,6 +46,19 @@ YardstickRun run_yardstick(const PlainSheet& sheet, int steps, double duration) 
 template YardstickRun run_yardstick<float>(const PlainSheet&, int, double);
 template YardstickRun run_yardstick<double>(const PlainSheet&, int, double);
 
+void read_modify_write(float* const arrays[7], long first, long last) {
+  // Numbers that the compiler does not know.
+  volatile float one = 1, zero = 0;
+  const float factor = one, add = zero;
+  float* __restrict a = arrays[0], * __restrict b = arrays[1], * __restrict c = arrays[2], * __restrict d = arrays[3], * __restrict e = arrays[4], * __restrict f = arrays[5], * __restrict g = arrays[6];
+#pragma GCC ivdep
+  for (long i = first; i < last; ++i) {
+    a[i] = a[i] * factor + add, b[i] = b[i] * factor + add, c[i] = c[i] * factor + add;
+    d[i] = d[i] * factor + add, e[i] = e[i] * factor + add, f[i] = f[i] * factor + add;
+    g[i] = g[i] * factor + add;
+  }
+}
+
 std::string yardstick_flags() { return HOOKE_YARDSTICK_FLAGS; }
 
 }  // namespace hooke::bench

@@ -30,6 +30,9 @@ YardstickRun run_yardstick(const PlainSheet& sheet, int steps, double duration);
 extern template YardstickRun run_yardstick<float>(const PlainSheet&, int, double);
 extern template YardstickRun run_yardstick<double>(const PlainSheet&, int, double);
 
+/// Multiplies and adds to each of seven arrays in place, from first to before last: what memory allows. Values stay.
+void read_modify_write(float* const arrays[7], long first, long last);
+
 /// How the yardstick was compiled.
 std::string yardstick_flags();
 

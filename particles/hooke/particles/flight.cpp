@@ -126,11 +126,7 @@ HWY_NOINLINE void meet(const Tile<S>& tile, const Flight<S>& flight, int leg, In
   const auto gap = gap_to(p, g);
   auto met = hn::Lt(gap, hn::Set(d, leg < 0 ? p.near : S(0)));
   met = hn::And(met, hn::FirstN(d, std::size_t(std::max<Index>(tile.count - i, 0))));
-  if (flight.skip) {
-    alignas(64) S mark[hn::MaxLanes(Lanes<S>())];
-    for (std::size_t k = 0; k < n; ++k) mark[k] = flight.skip[std::size_t(i) + k] ? S(1) : S(0);
-    met = hn::And(met, hn::Eq(hn::Load(d, mark), hn::Zero(d)));
-  }
+  if (flight.skip) met = hn::And(met, hn::Gt(hn::LoadU(d, flight.skip + i), hn::Zero(d)));
   if (leg < 0)
     rest<S>(d, p, met, g.v0, g.v1, g.v2);
   else

@@ -49,7 +49,7 @@ struct Flight {
   const Plane<S>* planes = nullptr;  ///< plane_count a leg
   Index plane_count = 0;
   S ageing = 0;                         ///< taken from what remains of life [s]
-  const unsigned char* skip = nullptr;  ///< planes let these particles alone
+  const S* skip = nullptr;              ///< planes let particles alone whose number here is not positive
   std::vector<Hit<S>>* hits = nullptr;  ///< where to tell impacts, or null
   int first_leg = 0;                    ///< number of legs[0], for hits
 };

@@ -84,28 +84,31 @@ HOOKE_INLINE void lattice_vector(std::uint32_t i, std::uint32_t j, std::uint32_t
   gz = S(std::int32_t((h >> 20) & 1023)) * unit - 1;
 }
 
-// The gradient of gradient noise at p (Perlin 2002's weights), which is what a curl needs.
+// A place in its cell of the lattice: weights along each axis (Perlin 2002's), their slopes, and what is left of it.
 template <class S>
-HOOKE_INLINE void noise_gradient(S x, S y, S z, std::uint32_t seed, S& gx, S& gy, S& gz) {
-  const S fx = std::floor(x), fy = std::floor(y), fz = std::floor(z);
-  const std::uint32_t i = std::uint32_t(std::int32_t(fx)), j = std::uint32_t(std::int32_t(fy)),
-                      k = std::uint32_t(std::int32_t(fz));
-  const S u = x - fx, v = y - fy, w = z - fz;
-  const S su = u * u * u * (u * (u * 6 - 15) + 10), sv = v * v * v * (v * (v * 6 - 15) + 10),
-          sw = w * w * w * (w * (w * 6 - 15) + 10);
-  const S du = 30 * u * u * (u - 1) * (u - 1), dv = 30 * v * v * (v - 1) * (v - 1), dw = 30 * w * w * (w - 1) * (w - 1);
-  gx = gy = gz = 0;
-  for (std::uint32_t c = 0; c < 8; ++c) {
-    const std::uint32_t a = c & 1, b = (c >> 1) & 1, e = c >> 2;
-    S lx, ly, lz;
-    lattice_vector(i + a, j + b, k + e, seed, lx, ly, lz);
-    const S value = lx * (u - S(int(a))) + ly * (v - S(int(b))) + lz * (w - S(int(e)));
-    const S wx = a ? su : 1 - su, wy = b ? sv : 1 - sv, wz = e ? sw : 1 - sw;
-    const S dx = a ? du : -du, dy = b ? dv : -dv, dz = e ? dw : -dw;
-    gx += dx * wy * wz * value + wx * wy * wz * lx;
-    gy += wx * dy * wz * value + wx * wy * wz * ly;
-    gz += wx * wy * dz * value + wx * wy * wz * lz;
-  }
+struct InCell {
+  std::uint32_t i, j, k;
+  S u, v, w;     // from the lower corner, in [0, 1)
+  S su, sv, sw;  // weight of the upper corner
+  S du, dv, dw;  // its slope
+};
+
+// What one corner of the cell adds to the curl of three noises.
+template <std::uint32_t kCorner, class S>
+HOOKE_INLINE void add_corner(const InCell<S>& at, std::uint32_t seed, S& ux, S& uy, S& uz) {
+  constexpr std::uint32_t a = kCorner & 1, b = (kCorner >> 1) & 1, e = kCorner >> 2;
+  const S u = at.u - S(int(a)), v = at.v - S(int(b)), w = at.w - S(int(e));
+  const S wx = a ? at.su : 1 - at.su, wy = b ? at.sv : 1 - at.sv, wz = e ? at.sw : 1 - at.sw;
+  const S all = wx * wy * wz;
+  const S dx = (a ? at.du : -at.du) * wy * wz, dy = (b ? at.dv : -at.dv) * wx * wz, dz = (e ? at.dw : -at.dw) * wx * wy;
+  S px, py, pz, qx, qy, qz, rx, ry, rz;
+  lattice_vector(at.i + a, at.j + b, at.k + e, seed, px, py, pz);
+  lattice_vector(at.i + a, at.j + b, at.k + e, seed + 0x9e3779b9u, qx, qy, qz);
+  lattice_vector(at.i + a, at.j + b, at.k + e, seed + 0x3c6ef372u, rx, ry, rz);
+  const S p = px * u + py * v + pz * w, q = qx * u + qy * v + qz * w, r = rx * u + ry * v + rz * w;
+  ux += dy * r + all * ry - dz * q - all * qz;
+  uy += dz * p + all * pz - dx * r - all * rx;
+  uz += dx * q + all * qx - dy * p - all * py;
 }
 
 template <class S>
@@ -117,13 +120,22 @@ HOOKE_INLINE void curl_loop(Index n, const S* const x[3], const S shift[3], S sc
   HOOKE_INDEPENDENT
   for (Index i = 0; i < n; ++i) {
     const S a = px[i] * scale + sx, b = py[i] * scale + sy, c = pz[i] * scale + sz;
-    S g0x, g0y, g0z, g1x, g1y, g1z, g2x, g2y, g2z;
-    noise_gradient(a, b, c, seed, g0x, g0y, g0z);
-    noise_gradient(a, b, c, seed + 0x9e3779b9u, g1x, g1y, g1z);
-    noise_gradient(a, b, c, seed + 0x3c6ef372u, g2x, g2y, g2z);
-    ux[i] += speed * (g2y - g1z);
-    uy[i] += speed * (g0z - g2x);
-    uz[i] += speed * (g1x - g0y);
+    // Rounding down without a call: lattices begin above zero.
+    const std::int32_t cx = std::int32_t(a), cy = std::int32_t(b), cz = std::int32_t(c);
+    InCell<S> at;
+    at.i = std::uint32_t(cx), at.j = std::uint32_t(cy), at.k = std::uint32_t(cz);
+    at.u = a - S(cx), at.v = b - S(cy), at.w = c - S(cz);
+    at.su = at.u * at.u * at.u * (at.u * (at.u * 6 - 15) + 10), at.du = 30 * at.u * at.u * (at.u - 1) * (at.u - 1);
+    at.sv = at.v * at.v * at.v * (at.v * (at.v * 6 - 15) + 10), at.dv = 30 * at.v * at.v * (at.v - 1) * (at.v - 1);
+    at.sw = at.w * at.w * at.w * (at.w * (at.w * 6 - 15) + 10), at.dw = 30 * at.w * at.w * (at.w - 1) * (at.w - 1);
+    S vx = 0, vy = 0, vz = 0;
+    add_corner<0>(at, seed, vx, vy, vz), add_corner<1>(at, seed, vx, vy, vz);
+    add_corner<2>(at, seed, vx, vy, vz), add_corner<3>(at, seed, vx, vy, vz);
+    add_corner<4>(at, seed, vx, vy, vz), add_corner<5>(at, seed, vx, vy, vz);
+    add_corner<6>(at, seed, vx, vy, vz), add_corner<7>(at, seed, vx, vy, vz);
+    ux[i] += speed * vx;
+    uy[i] += speed * vy;
+    uz[i] += speed * vz;
   }
 }
 HOOKE_CLONES void curl(Index n, const float* const x[3], const float shift[3], float scale, float speed,
@@ -166,6 +178,9 @@ template <class S>
 std::array<S, 3> three(const Vec3& v) {
   return {S(v.x()), S(v.y()), S(v.z())};
 }
+
+// Cells in a stretch of the lattice: places lie between one and two of them, plus what a system reaches.
+constexpr double kLattice = 1024;
 
 // RMS of one component of the curl above is about this, by sampling.
 constexpr double kCurlRms = 0.712;
@@ -269,9 +284,9 @@ void CurlNoise<S>::add_velocity(const Tile<S>& tile, const Vec3& origin, double 
   for (int octave = 0; octave < 2; ++octave) {
     std::array<S, 3> shift;
     for (int k = 0; k < 3; ++k) {
-      // Whole periods of the hash are left out, so that float keeps its digits after hours and far away.
+      // Whole stretches of the lattice are left out, so that float keeps its digits after hours and far away.
       const double place = (origin[k] / size) - kWays[octave][k] * t / settings_.turnover * (1 + octave);
-      shift[std::size_t(k)] = S(place - 65536 * std::floor(place / 65536));
+      shift[std::size_t(k)] = S(kLattice + place - kLattice * std::floor(place / kLattice));
     }
     curl(tile.count, tile.x, shift.data(), S(1 / size), S(speed), settings_.seed + std::uint32_t(octave) * 77773u, u);
     size /= 2;

@@ -117,7 +117,7 @@ struct ParticleSystem<S>::Plan {
 template <class S>
 struct ParticleSystem<S>::Worker {
   std::vector<S> memory;
-  std::vector<unsigned char> marks;
+  std::vector<S> marks;
   S *a[3], *predicted[3], *x0[3], *v0[3];
   std::vector<Hit<S>> hits;
   std::vector<Event> events;
@@ -129,7 +129,7 @@ struct ParticleSystem<S>::Worker {
   explicit Worker(Index tile) {
     const std::size_t each = std::size_t(tile) + std::size_t(Tile<S>::kLanes);
     memory.assign(12 * each, S(0));
-    marks.assign(each, 0);
+    marks.assign(each, S(1));
     S* at = memory.data();
     for (auto* arrays : {a, predicted, x0, v0})
       for (int k = 0; k < 3; ++k, at += each) arrays[k] = at;
@@ -576,7 +576,7 @@ void ParticleSystem<S>::integrate(Tile<S>& tile, Index first, Plan& plan, Worker
     if (!w.integrator->step(dynamics, w.x, w.v, plan.ends[std::size_t(s)], plan.h).converged) w.finite = false;
     if (plan.exact && plan.solids.any()) {
       Tile<S> view = contact.view(w.x, w.v);
-      std::fill_n(w.marks.data(), tile.count, static_cast<unsigned char>(1));
+      std::fill_n(w.marks.data(), tile.count, S(0));
       plan.solids.resolve_exactly(view, s, plan.h, w.x0, w.v0, w.marks.data(), plan.hits ? &w.hits : nullptr);
       w.integrator->restart();
     }
@@ -662,7 +662,7 @@ void ParticleSystem<S>::flight(Tile<S>& tile, Index first, Plan& plan, Worker& w
     landing_flight.planes = solids.planes(step), landing_flight.plane_count = solids.plane_count();
     fly(tile, landing_flight);
     if (plan.exact && solids.any()) {
-      std::fill_n(w.marks.data(), tile.count, static_cast<unsigned char>(1));
+      std::fill_n(w.marks.data(), tile.count, S(0));
       solids.resolve_exactly(tile, run, plan.h, w.x0, w.v0, w.marks.data(), hits);
     } else if (solids.bodies() && last_run) {
       if (solids.mark(tile, step, S(0), nullptr, w.marks.data())) solids.settle(tile, step, w.marks.data());

@@ -180,42 +180,37 @@ double gap_to(const Form& shape, const Vec3& p, double radius) {
   return signed_distance(shape, p) - radius;
 }
 
-// Marks the particles whose way from x - drift v (or from) to x comes into the box.
+// Marks the particles whose way from x - drift v (or from) to x comes into the box: by how far it stays away from it.
+// Returns whether there is one.
 template <class S>
-HOOKE_INLINE bool mark_loop(Index n, const S* const x[3], const S* const v[3], S drift, const S* const* from,
-                            const S lower[3], const S upper[3], unsigned char* marks) {
+HOOKE_INLINE bool mark_loop(Index n, const S* const x[3], const S* const other[3], S drift, bool back, const S lower[3],
+                            const S upper[3], S* marks) {
+  const S *x0 = x[0], *x1 = x[1], *x2 = x[2], *o0 = other[0], *o1 = other[1], *o2 = other[2];
+  const S l0 = lower[0], l1 = lower[1], l2 = lower[2], u0 = upper[0], u1 = upper[1], u2 = upper[2];
+  // The other end is x - drift v, or given.
+  const S keep = back ? S(1) : S(0), add = back ? -drift : S(1);
+  const auto larger = [](S a, S b) { return a < b ? b : a; };
+  const auto smaller = [](S a, S b) { return a < b ? a : b; };
   int found = 0;
-  const S *x0 = x[0], *x1 = x[1], *x2 = x[2];
-  const auto in = [](S a, S b, S low, S high) { return ((a < b ? b : a) >= low) & ((a < b ? a : b) <= high); };
-  if (from) {
-    const S *f0 = from[0], *f1 = from[1], *f2 = from[2];
-    HOOKE_INDEPENDENT
-    for (Index i = 0; i < n; ++i) {
-      const int hit = in(x0[i], f0[i], lower[0], upper[0]) & in(x1[i], f1[i], lower[1], upper[1]) &
-                      in(x2[i], f2[i], lower[2], upper[2]);
-      marks[i] = static_cast<unsigned char>(marks[i] | hit);
-      found |= hit;
-    }
-  } else {
-    const S *v0 = v[0], *v1 = v[1], *v2 = v[2];
-    HOOKE_INDEPENDENT
-    for (Index i = 0; i < n; ++i) {
-      const int hit = in(x0[i], x0[i] - drift * v0[i], lower[0], upper[0]) &
-                      in(x1[i], x1[i] - drift * v1[i], lower[1], upper[1]) &
-                      in(x2[i], x2[i] - drift * v2[i], lower[2], upper[2]);
-      marks[i] = static_cast<unsigned char>(marks[i] | hit);
-      found |= hit;
-    }
+  HOOKE_INDEPENDENT
+  for (Index i = 0; i < n; ++i) {
+    const S b0 = keep * x0[i] + add * o0[i], b1 = keep * x1[i] + add * o1[i], b2 = keep * x2[i] + add * o2[i];
+    const S away0 = larger(l0 - larger(x0[i], b0), smaller(x0[i], b0) - u0);
+    const S away1 = larger(l1 - larger(x1[i], b1), smaller(x1[i], b1) - u1);
+    const S away2 = larger(l2 - larger(x2[i], b2), smaller(x2[i], b2) - u2);
+    const S mark = smaller(marks[i], larger(away0, larger(away1, away2)));
+    marks[i] = mark;
+    found |= mark <= 0 ? 1 : 0;
   }
   return found != 0;
 }
-HOOKE_CLONES bool mark_ways(Index n, const float* const x[3], const float* const v[3], float drift,
-                            const float* const* from, const float l[3], const float u[3], unsigned char* marks) {
-  return mark_loop(n, x, v, drift, from, l, u, marks);
+HOOKE_CLONES bool mark_ways(Index n, const float* const x[3], const float* const other[3], float drift, bool back,
+                            const float l[3], const float u[3], float* marks) {
+  return mark_loop(n, x, other, drift, back, l, u, marks);
 }
-HOOKE_CLONES bool mark_ways(Index n, const double* const x[3], const double* const v[3], double drift,
-                            const double* const* from, const double l[3], const double u[3], unsigned char* marks) {
-  return mark_loop(n, x, v, drift, from, l, u, marks);
+HOOKE_CLONES bool mark_ways(Index n, const double* const x[3], const double* const other[3], double drift, bool back,
+                            const double l[3], const double u[3], double* marks) {
+  return mark_loop(n, x, other, drift, back, l, u, marks);
 }
 
 template <class S>
@@ -314,8 +309,8 @@ void Solids<S>::place(std::span<const Collider> colliders, const Vec3& origin, c
 }
 
 template <class S>
-bool Solids<S>::mark(const Tile<S>& tile, int leg, S drift, const S* const* from, unsigned char* marks) const {
-  std::fill_n(marks, tile.count, static_cast<unsigned char>(0));
+bool Solids<S>::mark(const Tile<S>& tile, int leg, S drift, const S* const* from, S* marks) const {
+  std::fill_n(marks, (tile.count + Tile<S>::kLanes - 1) / Tile<S>::kLanes * Tile<S>::kLanes, S(1));
   bool found = false;
   for (const Body& body : bodies_) {
     const Pose& p = pose(body, leg);
@@ -325,19 +320,19 @@ bool Solids<S>::mark(const Tile<S>& tile, int leg, S drift, const S* const* from
       const double slack = 1e-4 + 8 * double(std::numeric_limits<S>::epsilon()) * std::abs(p.lower[k] + p.upper[k]);
       lower[k] = S(p.lower[k] - slack), upper[k] = S(p.upper[k] + slack);
     }
-    found |= mark_ways(tile.count, tile.x, tile.v, drift, from, lower, upper, marks);
+    found |= mark_ways(tile.count, tile.x, from ? from : tile.v, drift, !from, lower, upper, marks);
   }
   return found;
 }
 
 template <class S>
-bool Solids<S>::mark_planes(const Tile<S>& tile, int leg, unsigned char* marks) const {
+bool Solids<S>::mark_planes(const Tile<S>& tile, int leg, S* marks) const {
   bool found = false;
   for (const Plane<S>* p = planes(leg); p < planes(leg) + plane_count_; ++p)
     for (Index i = 0; i < tile.count; ++i) {
       const S gap = p->normal[0] * tile.x[0][i] + p->normal[1] * tile.x[1][i] + p->normal[2] * tile.x[2][i] - p->offset;
       if (gap >= p->near) continue;
-      marks[i] = 1;
+      marks[i] = 0;
       found = true;
     }
   return found;
@@ -392,11 +387,11 @@ Vec3 Solids<S>::answer(const Meeting& at, const Vec3& v, double drift, Index i, 
 }
 
 template <class S>
-void Solids<S>::resolve(const Tile<S>& tile, int leg, S drift, const S* const* from, const unsigned char* marks,
+void Solids<S>::resolve(const Tile<S>& tile, int leg, S drift, const S* const* from, const S* marks,
                         std::vector<Hit<S>>* hits) const {
   const double h = ends_[std::size_t(leg) + 1] - ends_[std::size_t(leg)];
   for (Index i = 0; i < tile.count; ++i) {
-    if (!marks[i]) continue;
+    if (marks[i] > 0) continue;
     const Vec3 end = at<S>(tile.x, i);
     Vec3 v = at<S>(tile.v, i);
     Vec3 p = from ? at<S>(from, i) : Vec3(end - double(drift) * v);
@@ -444,12 +439,12 @@ void Solids<S>::resolve(const Tile<S>& tile, int leg, S drift, const S* const* f
 
 template <class S>
 void Solids<S>::resolve_exactly(const Tile<S>& tile, int leg, double h, const S* const x0[3], const S* const v0[3],
-                                const unsigned char* marks, std::vector<Hit<S>>* hits) const {
+                                const S* marks, std::vector<Hit<S>>* hits) const {
   // As many impacts as a ball that comes to rest makes within a step.
   constexpr int kMostImpacts = 10'000;
   constexpr int kPieces = 32;
   for (Index i = 0; i < tile.count; ++i) {
-    if (!marks[i]) continue;
+    if (marks[i] > 0) continue;
     Vec3 x = at<S>(x0, i), v = at<S>(v0, i);
     Vec3 a = (at<S>(tile.v, i) - v) / h;
     double now = 0;
@@ -558,10 +553,10 @@ void Solids<S>::resolve_exactly(const Tile<S>& tile, int leg, double h, const S*
 }
 
 template <class S>
-void Solids<S>::settle(const Tile<S>& tile, int leg, const unsigned char* marks) const {
+void Solids<S>::settle(const Tile<S>& tile, int leg, const S* marks) const {
   const double h = ends_[std::size_t(leg) + 1] - ends_[std::size_t(leg)];
   for (Index i = 0; i < tile.count; ++i) {
-    if (!marks[i]) continue;
+    if (marks[i] > 0) continue;
     const Vec3 x = at<S>(tile.x, i);
     Vec3 v = at<S>(tile.v, i);
     bool changed = false;

@@ -31,27 +31,27 @@ class Solids {
   bool bodies() const { return !bodies_.empty(); }
   bool callbacks() const { return !callbacks_.empty(); }
 
-  /// Marks the particles that may meet a body on the way from x - drift v (or `from`) to x. Returns whether there is
-  /// one.
-  bool mark(const Tile<S>& tile, int leg, S drift, const S* const* from, unsigned char* marks) const;
+  /// Marks (a number that is not positive) the particles that may meet a body on the way from x - drift v (or `from`)
+  /// to x. Returns whether there is one.
+  bool mark(const Tile<S>& tile, int leg, S drift, const S* const* from, S* marks) const;
 
   /// Takes marked particles along their way again, this time with everything that is in it, half-spaces included.
-  void resolve(const Tile<S>& tile, int leg, S drift, const S* const* from, const unsigned char* marks,
+  void resolve(const Tile<S>& tile, int leg, S drift, const S* const* from, const S* marks,
                std::vector<Hit<S>>* hits) const;
 
   /// The way is x0 + v0 s + ½ a s², a from the velocities before (v0) and after: impact times are solved on it, as
   /// many as there are.
   void resolve_exactly(const Tile<S>& tile, int leg, double h, const S* const x0[3], const S* const v0[3],
-                       const unsigned char* marks, std::vector<Hit<S>>* hits) const;
+                       const S* marks, std::vector<Hit<S>>* hits) const;
 
   /// Marked particles that press slowly into a body stop doing so.
-  void settle(const Tile<S>& tile, int leg, const unsigned char* marks) const;
+  void settle(const Tile<S>& tile, int leg, const S* marks) const;
 
   /// Colliders of somebody else's engine, at the end of a leg.
   void call_back(const Tile<S>& tile, int leg, std::vector<Hit<S>>* hits) const;
 
   /// Marks particles that are beyond a plane at the end of a leg, for ways that flight did not take.
-  bool mark_planes(const Tile<S>& tile, int leg, unsigned char* marks) const;
+  bool mark_planes(const Tile<S>& tile, int leg, S* marks) const;
 
  private:
   // A solid in the frame of a leg's start; it moves by `move` within the leg.
