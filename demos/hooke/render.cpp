@@ -112,7 +112,7 @@ int render(const RenderOptions& options) {
     render::write_png(options.poster, shot.draw(large, frame));
     std::printf("%s\n", options.poster.c_str());
   }
-  std::printf("%s\n", sink.path().c_str());
+  std::printf("%s%s\n", shot.told().c_str(), sink.path().c_str());
   if (!result.report.good()) std::fprintf(stderr, "hooke: %s\n", result.report.text().c_str());
   return cut ? int(kInterrupted) : result.exit_code();
 }

@@ -17,7 +17,35 @@ namespace {
 constexpr double kClothThickness = 2.5e-3;  // [m] as drawn
 constexpr double kFollowWidth = 0.6;        // [s], standard deviation of the camera's average
 constexpr Index kMostSticks = 20000;
+constexpr double kShutter = 0.5;           // open for this share of a frame
+constexpr double kStray = 0.02;            // share of the particles at either end that the picture need not hold
+constexpr double kWetness = 0.7;           // of stone beside water
+constexpr double kPoolStart = 2;           // [s] of drops that fell in before the first picture
+const Vec3 kPoolFloor{0.09, 0.10, 0.115};  // drops are seen by the light they bend: before a dark ground
+constexpr double kCrease = 40 * std::numbers::pi / 180;
 const Vec3 kClothColor{0.42, 0.022, 0.028}, kInsideColor{0.05, 0.04, 0.045}, kSolidColor{0.40, 0.42, 0.45};
+
+render::Material material_of(scene::Surface look, const std::optional<Vec3>& color, bool wet) {
+  render::Material material;
+  material.color = kSolidColor;
+  if (look == scene::Surface::Stone) material = render::sandstone();
+  if (look == scene::Surface::Steel) material = render::steel();
+  if (look == scene::Surface::Water) material = render::water();
+  if (color) material.color = *color;
+  if (look == scene::Surface::Stone || look == scene::Surface::Steel) material.inside_color = material.color;
+  if (look == scene::Surface::Stone && wet) material.wetness = kWetness;
+  return material;
+}
+
+// Where all but the outermost `kStray` of them are.
+void cover_most(std::vector<float>& values, double& low, double& high) {
+  const auto at = [&](double share) {
+    const auto place = values.begin() + std::ptrdiff_t(share * double(values.size() - 1));
+    std::nth_element(values.begin(), place, values.end());
+    return double(*place);
+  };
+  low = std::min(low, at(kStray)), high = std::max(high, at(1 - kStray));
+}
 
 // The hips, as they would move if they did nothing abruptly: a Gaussian average over time.
 Vec3 followed(const human::Human& human, double t, double least_time, std::vector<io::JointFrame>& joints) {
@@ -35,8 +63,9 @@ Vec3 followed(const human::Human& human, double t, double least_time, std::vecto
 }  // namespace
 
 Snapshot snapshot_of(const scene::Scene& scene, double simulate_ms) {
-  Snapshot out{scene.shown_time(), simulate_ms, scene::worst_stretch(scene), {}};
+  Snapshot out{scene.shown_time(), simulate_ms, scene::worst_stretch(scene), {}, {}};
   for (const scene::SceneBody& body : scene.bodies) out.points.push_back(body.body->positions().cast<float>());
+  for (const scene::SceneParticles& particles : scene.particles) out.particles.push_back(particles.view());
   return out;
 }
 
@@ -47,6 +76,8 @@ Shot::Shot(const scene::Scene& scene, const std::vector<Snapshot>& snapshots, do
   find_bounds();
   find_path();
   for (const scene::SceneBody& body : scene.bodies) add_body(body);
+  for (const scene::SceneParticles& particles : scene.particles)
+    particles_.emplace_back(particles.kinds(), kShutter / scene.description.frame_rate);
   add_colliders();
   choose_camera(aspect);
 }
@@ -79,8 +110,16 @@ void Shot::add_colliders() {
                                    [&](const scene::SceneHuman& each) { return each.collider == i; });
     if (human || colliders[i].shapes.empty() || std::holds_alternative<HalfSpace>(colliders[i].shapes[0])) continue;
     colliders_.push_back(i);
+    const scene::ColliderDescription& says = scene_.description.colliders[i];
+    const auto* set = std::get_if<LevelSet>(&colliders[i].shapes[0]);
+    if (says.look == scene::Surface::Water && set && !colliders[i].motion) {
+      colliders_.pop_back();
+      pools_.emplace_back(*set);
+      continue;
+    }
+    meshes_.push_back(scene_.meshes[i] ? with_creases(*scene_.meshes[i], kCrease) : TriangleMesh{});
     Drawn drawn;
-    drawn.material.color = scene_.description.colliders[i].color.value_or(kSolidColor);
+    drawn.material = material_of(says.look, says.color, any({scene::Look::Drop, scene::Look::Water}));
     drawn_.push_back(std::move(drawn));
   }
 }
@@ -111,12 +150,27 @@ void Shot::find_bounds() {
           if (half->normal.y() > 0.999) floor = std::max(floor.value_or(half->offset), half->offset);
         } else if (const auto* sphere = std::get_if<Sphere>(&shape)) {
           cover(sphere->center, sphere->radius);
+        } else if (const auto* capsule = std::get_if<Capsule>(&shape)) {
+          cover(capsule->a, capsule->radius);
+          cover(capsule->b, capsule->radius);
+        } else if (const auto* box = std::get_if<Box>(&shape)) {
+          const Vec3 extent = box->axes.cwiseAbs() * box->half_extent;
+          cover(box->center - extent, 0);
+          cover(box->center + extent, 0);
         } else {
-          const auto& capsule = std::get<Capsule>(shape);
-          cover(capsule.a, capsule.radius);
-          cover(capsule.b, capsule.radius);
+          const auto& set = std::get<LevelSet>(shape);
+          cover(set.offset + set.grid->lower(), 0);
+          cover(set.offset + set.grid->upper(), 0);
         }
       }
+  }
+  std::vector<float> places;
+  for (int k = 0; k < 3; ++k) {
+    places.clear();
+    for (const Snapshot& snapshot : snapshots_)
+      for (const scene::ParticleView& view : snapshot.particles)
+        places.insert(places.end(), view.positions.col(k).begin(), view.positions.col(k).end());
+    if (!places.empty()) cover_most(places, low[k], high[k]);
   }
   if (low.x() > high.x()) low = Vec3::Zero(), high = Vec3::Ones();
   // Without a floor everything hangs a little above that of the stage.
@@ -165,7 +219,41 @@ render::Camera Shot::camera_at(std::size_t frame) const {
   return camera;
 }
 
-render::Look Shot::look() const { return render::look_for(camera_at(0)); }
+render::Look Shot::look() const {
+  if (any({scene::Look::Spark})) return render::workshop_for(camera_at(0));
+  render::Look look = render::look_for(camera_at(0));
+  if (any({scene::Look::Drop, scene::Look::Water})) look.floor_color = kPoolFloor;
+  return look;
+}
+
+bool Shot::any(std::initializer_list<scene::Look> looks) const {
+  for (const scene::SceneParticles& particles : scene_.particles)
+    for (const scene::ParticleKind& kind : particles.kinds())
+      if (std::find(looks.begin(), looks.end(), kind.look) != looks.end()) return true;
+  return false;
+}
+
+// Pools remember: every frame before this one has its share in the waves.
+void Shot::fill_pools(std::size_t frame) {
+  if (pools_.empty()) return;
+  std::vector<std::vector<scene::ParticleKind>> kinds;
+  for (const scene::SceneParticles& particles : scene_.particles) kinds.push_back(particles.kinds());
+  const double seconds = 1 / scene_.description.frame_rate;
+  const auto advance = [&](std::size_t with) {
+    for (Pool& pool : pools_) pool.advance(snapshots_[with].particles, kinds, seconds);
+  };
+  if (frame + 1 < pool_frame_) {
+    for (Pool& pool : pools_) pool.calm();
+    pool_frame_ = 0;
+  }
+  if (pool_frame_ == 0) {  // what was there before the first picture is taken from those after it
+    const auto before = std::min(snapshots_.size(), std::size_t(kPoolStart / seconds));
+    for (std::size_t k = before; k-- > 0;) advance(k);
+    advance(0);
+    pool_frame_ = 1;
+  }
+  for (; pool_frame_ <= frame; ++pool_frame_) advance(pool_frame_);
+}
 
 void Shot::place(std::size_t frame) {
   const Snapshot& snapshot = snapshots_[frame];
@@ -185,10 +273,13 @@ void Shot::place(std::size_t frame) {
       append_sticks(points, sticks, 0.004 * std::max(0.05, (upper_ - lower_).norm()), mesh);
   }
   for (const scene::SceneHuman& human : scene_.humans) human.human.skin(snapshot.time, drawn_[next++].mesh.vertices);
-  for (const std::size_t collider : colliders_) {
+  for (std::size_t i = 0; i < colliders_.size(); ++i) {
     TriangleMesh& mesh = drawn_[next++].mesh;
-    mesh = {};
-    for (const Shape& shape : shapes_at(collider, snapshot.time)) append_shape(shape, mesh);
+    mesh = meshes_[i];
+    for (const Shape& shape : shapes_at(colliders_[i], snapshot.time)) {
+      append_shape(shape, mesh);
+      if (const auto* set = std::get_if<LevelSet>(&shape)) mesh.vertices.rowwise() += set->offset.transpose().array();
+    }
   }
   for (Drawn& drawn : drawn_) drawn.mesh.vertices.col(1) += lift_;
 }
@@ -199,16 +290,26 @@ std::vector<std::string> Shot::caption(std::size_t frame) const {
   Index points = 0;
   for (const scene::SceneBody& body : scene_.bodies) points += body.body->size();
   char text[200];
-  if (!scene_.bodies.empty()) {
-    const MotionFacts facts = scene_.bodies[0].body->motion_facts();
-    std::snprintf(text, sizeof text, "%ld points, %s, %s, step %.3g ms", long(points), facts.method.c_str(),
+  if (!scene_.bodies.empty() || !scene_.particles.empty()) {
+    const Body& first = scene_.bodies.empty() ? scene_.particles[0].body() : *scene_.bodies[0].body;
+    const MotionFacts facts = first.motion_facts();
+    const std::string count = scene_.bodies.empty() ? "" : std::to_string(points) + " points, ";
+    std::snprintf(text, sizeof text, "%s%s, %s, step %.3g ms", count.c_str(), facts.method.c_str(),
                   facts.precision.c_str(),
                   1e3 * scene_.world.clock().tick() / double(std::max<Index>(1, facts.substeps)));
     lines.emplace_back(text);
   }
-  std::snprintf(text, sizeof text, "%.3g ms a frame, worst stretch %.1f %%", mean_ms_,
-                100 * snapshots_[frame].worst_stretch);
-  lines.emplace_back(text);
+  Index alive = 0;
+  for (const scene::ParticleView& view : snapshots_[frame].particles) alive += view.positions.rows();
+  std::string line;
+  if (!scene_.particles.empty()) line += std::to_string(alive) + " particles, ";
+  std::snprintf(text, sizeof text, "%.3g ms a frame", mean_ms_);
+  line += text;
+  if (!scene_.bodies.empty()) {
+    std::snprintf(text, sizeof text, ", worst stretch %.1f %%", 100 * snapshots_[frame].worst_stretch);
+    line += text;
+  }
+  lines.push_back(line);
   return lines;
 }
 
@@ -225,7 +326,36 @@ render::Image Shot::draw(render::Stage& stage, std::size_t frame) {
     model.subdivisions = drawn.subdivisions;
     models.push_back(model);
   }
-  return stage.draw(models, camera_at(frame), caption(frame));
+  fill_pools(frame);
+  std::vector<TriangleMesh> pools;
+  for (const Pool& pool : pools_) {
+    pools.push_back(pool.mesh());
+    pools.back().vertices.col(1) += lift_;
+  }
+  for (std::size_t i = 0; i < pools_.size(); ++i) {
+    render::Model model;
+    model.mesh = &pools[i];
+    model.material = render::water();
+    model.cover = &pools_[i].foam();
+    models.push_back(model);
+  }
+  std::vector<render::Particles> particles;
+  for (std::size_t i = 0; i < particles_.size(); ++i) {
+    particles_[i].place(snapshots_[frame].particles[i], lift_);
+    particles_[i].append(particles);
+    particles_[i].append(models);
+  }
+  ++pictures_;
+  return stage.draw(models, particles, camera_at(frame), caption(frame));
+}
+
+std::string Shot::told() const {
+  double seconds = 0;
+  for (const ParticleShot& particles : particles_) seconds += particles.meshing_seconds();
+  if (seconds == 0) return {};
+  char text[80];
+  std::snprintf(text, sizeof text, "water surface: %.3g ms a picture\n", 1e3 * seconds / double(pictures_));
+  return text;
 }
 
 }  // namespace hooke::command

@@ -2,6 +2,9 @@
 // seen from.
 #pragma once
 
+#include "particle_shot.hpp"
+#include "pool.hpp"
+
 #include <render/stage.hpp>
 #include <scene/scene.hpp>
 
@@ -15,7 +18,8 @@ struct Snapshot {
   double time = 0;  ///< shown [s]
   double simulate_ms = 0;
   double worst_stretch = 0;
-  std::vector<Points<float>> points;  ///< one a body [m]
+  std::vector<Points<float>> points;           ///< one a soft body [m]
+  std::vector<scene::ParticleView> particles;  ///< one a particle system
 };
 
 /// @param simulate_ms of this frame
@@ -30,6 +34,8 @@ class Shot {
   render::Look look() const;
   /// Draws one of the snapshots.
   render::Image draw(render::Stage& stage, std::size_t frame);
+  /// What making water's surfaces took, or nothing.
+  std::string told() const;
 
  private:
   struct Drawn {
@@ -48,11 +54,18 @@ class Shot {
   render::Camera camera_at(std::size_t frame) const;
   std::vector<std::string> caption(std::size_t frame) const;
   std::vector<Shape> shapes_at(std::size_t collider, double shown_time) const;
+  bool any(std::initializer_list<scene::Look> looks) const;
+  void fill_pools(std::size_t frame);
 
   const scene::Scene& scene_;
   const std::vector<Snapshot>& snapshots_;
+  std::vector<ParticleShot> particles_;   // one a particle system
   std::vector<Drawn> drawn_;              // bodies, humans, colliders
-  std::vector<std::size_t> colliders_;    // those drawn from their shapes
+  std::vector<std::size_t> colliders_;    // those that are not humans
+  std::vector<TriangleMesh> meshes_;      // of those, where they are level sets
+  std::vector<Pool> pools_;               // colliders that are drawn as water
+  std::size_t pool_frame_ = 0;            // what the pools show
+  std::size_t pictures_ = 0;              // drawn so far
   Vec3 lower_{0, 0, 0}, upper_{0, 0, 0};  // of everything in all frames
   double lift_ = 0;                       // [m], so that the floor of the scene is the floor of the stage
   std::vector<Vec3> path_;                // what the camera follows, one a frame
