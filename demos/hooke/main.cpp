@@ -67,9 +67,11 @@ int dispatch(int argc, char** argv) {
 
   CLI::App* simulate_command = app.add_subcommand("simulate", "Simulate a scene and write its end and its diagnostics");
   add_run_options(*simulate_command, a.simulate.run);
-  simulate_command->add_option("--out", a.simulate.out, "Folder for state.csv, diagnostics.csv and timings.csv")
+  simulate_command
+      ->add_option("--out", a.simulate.out, "Folder for state.csv, diagnostics.csv, particles.csv and timings.csv")
       ->required();
-  simulate_command->add_option("--export", a.simulate.export_format, "Moving meshes as well: obj, ply or pc2");
+  simulate_command->add_option("--export", a.simulate.export_format,
+                               "Also: soft bodies as obj, ply or pc2, particles as ply, csv or vdb");
   simulate_command->add_option(
       "--error", a.simulate.run.error,
       "Wanted error at the end, a share of each body's size: picks method, precision and step");

@@ -63,6 +63,8 @@ scene::Scene prepare(const RunOptions& options) {
   if (options.threads < 1 || options.threads > 1024)
     throw Error("--threads must be from 1 to 1024, got " + std::to_string(options.threads));
   scene::SceneDescription description = scene::find_scene(options.scene);
+  if (options.error > 0 && description.bodies.empty() && !description.particles.empty())
+    throw Error("--error is for soft bodies, and the scene has particles alone; give --method, --dt or --precision");
   if (options.error > 0)
     scene::choose_solvers(description, options.error);
   else
@@ -173,6 +175,13 @@ std::string chosen(const scene::Scene& scene) {
         tick / double(std::max<Index>(facts.substeps, 1)) > facts.stable_step)
       out += format("%s: warning: the step is above the largest stable one, %.4g ms\n", body.body->name().c_str(),
                     1e3 * facts.stable_step);
+  }
+  for (const scene::SceneParticles& particles : scene.particles) {
+    const MotionFacts facts = particles.body().motion_facts();
+    out += particles.body().name() + ": " + particles.text() + "; " + facts.method + ", " + facts.precision + ", ";
+    out += format("%ld substep%s of %.4g ms a tick of %.4g ms%s\n", long(facts.substeps),
+                  facts.substeps == 1 ? "" : "s", 1e3 * tick / double(std::max<Index>(facts.substeps, 1)), 1e3 * tick,
+                  facts.wanted_dt > 0 ? " (dt given)" : "");
   }
   return out;
 }

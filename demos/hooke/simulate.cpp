@@ -1,39 +1,27 @@
 #include "commands.hpp"
+#include "exports.hpp"
 
 #include <hooke/error.hpp>
-#include <hooke/io/mesh_cache.hpp>
 #include <hooke/io/tables.hpp>
 #include <scene/accuracy.hpp>
 
-#include <algorithm>
 #include <cstdio>
-#include <memory>
-#include <set>
+#include <optional>
 
 namespace hooke::command {
 
 namespace {
 
-// A body's name as part of a file name; different bodies get different ones.
-std::string file_name(const std::string& name, std::set<std::string>& taken) {
-  std::string out;
-  for (const char c : name)
-    out += (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '-' || c == '_' ? c : '_';
-  std::string unique = out.substr(0, 100);
-  for (int i = 2; !taken.insert(unique).second; ++i) unique = out.substr(0, 100) + "-" + std::to_string(i);
-  return unique;
-}
-
 // The files of one run.
 class Outputs {
  public:
-  Outputs(const SimulateOptions& options, const scene::Scene& scene)
-      : folder_(options.out), diagnostics_(folder_ / "diagnostics.csv"), timings_(folder_ / "timings.csv") {
-    if (options.export_format.empty()) return;
-    std::set<std::string> taken;
-    for (const scene::SceneBody& body : scene.bodies)
-      caches_.push_back(io::make_mesh_cache(io::cache_format_named(options.export_format), folder_,
-                                            file_name(body.body->name(), taken), body.triangles));
+  Outputs(const SimulateOptions& options, const scene::Scene& scene, Exports& exports)
+      : folder_(options.out),
+        diagnostics_(folder_ / "diagnostics.csv"),
+        timings_(folder_ / "timings.csv"),
+        exports_(exports) {
+    if (!scene.particles.empty()) counts_.emplace(folder_ / "particles.csv");
+    exports_.open(folder_);
   }
 
   void add(const scene::Scene& scene, double simulate_ms) {
@@ -51,7 +39,8 @@ class Outputs {
                                       energy.elastic,     scene.world.momentum(), scene::worst_stretch(scene)};
     timings.measure = lap();
     diagnostics_.add(diagnostics);
-    for (std::size_t i = 0; i < caches_.size(); ++i) caches_[i]->add(scene.bodies[i].body->positions());
+    if (counts_) counts_->add(scene);
+    exports_.add();
     timings.write = lap();
     timings_.add(timings);
   }
@@ -60,18 +49,29 @@ class Outputs {
     io::StateTable state(folder_ / "state.csv");
     for (const scene::SceneBody& body : scene.bodies)
       state.add(body.body->name(), body.body->positions(), body.body->velocities());
+    for (const scene::SceneParticles& particles : scene.particles)
+      state.add(particles.body().name(), particles.body().positions(), particles.body().velocities());
     state.finish();
     diagnostics_.finish();
     timings_.finish();
-    for (const auto& cache : caches_) cache->finish();
+    if (counts_) counts_->finish();
+    exports_.finish();
   }
 
  private:
   std::filesystem::path folder_;
   io::DiagnosticsTable diagnostics_;
   io::TimingsTable timings_;
-  std::vector<std::unique_ptr<io::MeshCache>> caches_;
+  std::optional<CountsTable> counts_;
+  Exports& exports_;
 };
+
+// Particles come and go, and an error is that of a point.
+void print_left_out(const scene::Scene& scene, const char* what) {
+  for (const scene::SceneParticles& particles : scene.particles)
+    std::printf("%s: no %s: it follows points from start to end, and particles come and go\n",
+                particles.body().name().c_str(), what);
+}
 
 void print_choices(const scene::Scene& scene) {
   std::printf("%s", chosen(scene).c_str());
@@ -82,6 +82,7 @@ void print_choices(const scene::Scene& scene) {
 
 // By the chooser where it was asked, else by a part of the run with half the steps.
 void print_estimates(const scene::Scene& scene) {
+  print_left_out(scene, "error estimate");
   bool all = true;
   for (const scene::SceneBody& body : scene.bodies) {
     all = all && body.choice;
@@ -105,6 +106,7 @@ void print_estimates(const scene::Scene& scene) {
 }
 
 void print_verification(const scene::Scene& scene) {
+  print_left_out(scene, "verification");
   for (const scene::Accuracy& body : scene::verify_errors(scene))
     std::printf("%s: true error %.2g m, %.2g of its size (reference settled to %.1g m)\n", body.body.c_str(),
                 body.error, body.error / body.size, body.uncertainty);
@@ -113,10 +115,12 @@ void print_verification(const scene::Scene& scene) {
 }  // namespace
 
 int simulate(const SimulateOptions& options) {
-  if (!options.export_format.empty()) io::cache_format_named(options.export_format);
+  if (!options.export_format.empty()) check_export_format(options.export_format);
   scene::Scene scene = prepare(options.run);
+  Exports exports(options.export_format, scene);
   io::make_folder(options.out);
-  Outputs outputs(options, scene);
+  Outputs outputs(options, scene, exports);
+  std::printf("%s", exports.left_out().c_str());
   catch_signals();
   bool told = false;
   const RunResult result = run(scene, scene.description.duration, [&](std::int64_t frame, double ms) {

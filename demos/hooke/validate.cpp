@@ -22,6 +22,13 @@ void print_body(const scene::SceneBody& body) {
               body.triangles.size(), body.body->total_mass(), extent.x(), extent.y(), extent.z());
 }
 
+void print_particles(const scene::SceneParticles& particles) {
+  std::string kinds;
+  for (const scene::ParticleKind& kind : particles.kinds()) kinds += (kinds.empty() ? "" : ", ") + kind.name;
+  std::printf("%s: particles of the kinds %s; after a tick %ld alive of %lld born\n", particles.body().name().c_str(),
+              kinds.c_str(), long(particles.body().size()), static_cast<long long>(particles.counts().born));
+}
+
 // "0.53 ms", "none", "any" or why the method cannot be used.
 std::string stable_text(double step) {
   if (std::isinf(step)) return "any";
@@ -62,6 +69,7 @@ int validate(const std::string& name) {
     print_body(scene.bodies[i]);
     std::printf("  largest stable step:\n%s", stable[i].c_str());
   }
+  for (const scene::SceneParticles& particles : scene.particles) print_particles(particles);
   std::printf("%s", chosen(scene).c_str());
   if (!report.good()) {
     std::printf("the first tick fails: %s\n", report.text().c_str());

@@ -52,6 +52,8 @@ SceneDescription settled(const Scene& scene) {
     solver.precision = choice.precision;
     solver.dt = choice.dt;
   }
+  // They push no soft body, and their points come and go.
+  out.particles.clear();
   return out;
 }
 
@@ -108,6 +110,7 @@ std::vector<Accuracy> verify_errors(const Scene& end) {
   const std::int64_t ticks = end.world.clock().ticks();
   const double tick = end.world.clock().tick();
   SceneDescription finer = end.description;
+  finer.particles.clear();
   std::vector<double> steps;
   for (std::size_t i = 0; i < end.bodies.size(); ++i) {
     Solver& solver = finer.bodies[i].solver;

@@ -1,5 +1,8 @@
 #include <scene/scene.hpp>
 
+#include <scene/form.hpp>
+#include <scene/told.hpp>
+
 #include <hooke/error.hpp>
 #include <hooke/io/mesh_file.hpp>
 #include <hooke/point_body.hpp>
@@ -14,21 +17,12 @@ namespace {
 using softbody::Family;
 
 [[noreturn]] void fail(const SceneDescription& scene, const std::string& path, const std::string& rule) {
-  throw Error(scene.file + ": " + path + ": " + rule);
+  fail_at(scene.file, path, rule);
 }
 
-// What the library objects to, told with the place in the file.
 template <class Work>
 auto told_at(const SceneDescription& scene, const std::string& path, const Work& work) {
-  try {
-    return work();
-  } catch (const Error& error) {
-    fail(scene, path, error.what());
-  } catch (const std::invalid_argument& error) {
-    fail(scene, path, error.what());
-  } catch (const std::out_of_range& error) {
-    fail(scene, path, error.what());
-  }
+  return hooke::scene::told_at(scene.file, path, work);
 }
 
 softbody::Cloth cloth_of(const Grid& grid, const Material& material) {
@@ -104,14 +98,23 @@ void lay_out_uv(const Lattice& lattice, double width, double height, SceneBody& 
 class Builder {
  public:
   Builder(const SceneDescription& description, const Scene* reuse)
-      : d_(description), reuse_(reuse), scene_{World(description.tick_rate), description, {}, {}} {}
+      : d_(description), reuse_(reuse), scene_{World(description.tick_rate), description, {}, {}, {}, {}} {}
 
   Scene run() {
     scene_.world.set_gravity(d_.gravity);
     scene_.world.set_damping(d_.damping);
-    for (const ColliderDescription& collider : d_.colliders)
-      told_at(d_, collider.path, [&] { add_collider(collider); });
+    for (const ColliderDescription& collider : d_.colliders) {
+      const auto* form = std::get_if<MovingForm>(&collider.solid);
+      if (form)
+        told_at(d_, collider.path + (std::holds_alternative<LatheForm>(form->form) ? ".profile" : ".file"),
+                [&] { add_form(collider, *form); });
+      else
+        told_at(d_, collider.path, [&] { add_collider(collider); });
+      scene_.meshes.resize(scene_.world.colliders().size());
+    }
     for (const SoftBody& body : d_.bodies) add_body(body);
+    for (const ParticleBody& body : d_.particles)
+      scene_.particles.emplace_back(body, d_.file, d_.preroll, scene_.world);
     return std::move(scene_);
   }
 
@@ -123,15 +126,32 @@ class Builder {
     collider.restitution = description.restitution;
     if (const auto* solid = std::get_if<MovingShape>(&description.solid)) {
       collider.shapes = {solid->shape};
-      if (solid->motion) collider.motion = move_shape(*solid);
+      if (solid->motion) collider.motion = move_shape(solid->shape, *solid->motion);
     } else {
       add_human(description, collider);
     }
     scene_.world.add_collider(std::move(collider));
   }
 
-  std::function<void(double, std::span<Shape>)> move_shape(const MovingShape& solid) const {
-    return [start = solid.shape, drive = *solid.motion, preroll = d_.preroll](double t, std::span<Shape> shapes) {
+  void add_form(const ColliderDescription& description, const MovingForm& solid) {
+    const std::size_t number = scene_.world.colliders().size();
+    Form form;
+    if (reuse_ && number < reuse_->meshes.size() && reuse_->meshes[number])
+      form = {std::get<LevelSet>(reuse_->world.colliders()[number].shapes[0]).grid, reuse_->meshes[number]};
+    else
+      form = make_form(solid);
+    Collider collider;
+    collider.name = description.name;
+    collider.friction = description.friction;
+    collider.restitution = description.restitution;
+    collider.shapes = {LevelSet{form.grid, solid.origin}};
+    if (solid.motion) collider.motion = move_shape(collider.shapes[0], *solid.motion);
+    scene_.world.add_collider(std::move(collider));
+    scene_.meshes.push_back(form.mesh);
+  }
+
+  std::function<void(double, std::span<Shape>)> move_shape(const Shape& shape, const Drive& motion) const {
+    return [start = shape, drive = motion, preroll = d_.preroll](double t, std::span<Shape> shapes) {
       const Vec3 offset = drive.offset(t - preroll);
       shapes[0] = start;
       if (auto* sphere = std::get_if<Sphere>(&shapes[0])) sphere->center += offset;
@@ -139,6 +159,8 @@ class Builder {
         capsule->a += offset;
         capsule->b += offset;
       }
+      if (auto* box = std::get_if<Box>(&shapes[0])) box->center += offset;
+      if (auto* set = std::get_if<LevelSet>(&shapes[0])) set->offset += offset;
     };
   }
 
@@ -325,6 +347,7 @@ void override_solver(SceneDescription& description, const std::string& method, d
     if (dt > 0) body.solver.dt = dt;
     if (!precision.empty()) body.solver.precision = softbody::precision_named(precision);
   }
+  for (ParticleBody& body : description.particles) override_solver(body, method, dt, precision);
 }
 
 void choose_solvers(SceneDescription& description, double error) {

@@ -4,7 +4,10 @@
 
 #include <hooke/softbody/soft_body.hpp>
 #include <scene/cape.hpp>
+#include <scene/drive.hpp>
+#include <scene/particles.hpp>
 
+#include <array>
 #include <filesystem>
 #include <optional>
 #include <string>
@@ -12,20 +15,6 @@
 #include <vector>
 
 namespace hooke::scene {
-
-/// Where something driven is, relative to its start, in shown time. Before time 0 it stands still.
-struct Key {
-  double time = 0;       ///< [s]
-  Vec3 offset{0, 0, 0};  ///< [m]
-};
-struct Drive {
-  Vec3 translate{0, 0, 0};  ///< [m/s]
-  Vec3 swing{0, 0, 0};      ///< amplitude of a sine [m]
-  double period = 1;        ///< of the sine [s]
-  std::vector<Key> keys;    ///< instead of the above: a smooth path through these
-
-  Vec3 offset(double t) const;  ///< [m]; a function of time alone
-};
 
 /// Points by index or as an edge of a grid ("top", "bottom-left", …).
 using PointChoice = std::variant<Index, std::string>;
@@ -92,11 +81,35 @@ struct MovingShape {
   Shape shape;
   std::optional<Drive> motion;
 };
+
+/// Solids that become level sets.
+struct MeshForm {
+  std::filesystem::path file;  ///< OBJ, closed
+};
+struct LatheForm {
+  std::vector<std::array<double, 2>> profile;  ///< radius and height [m], as turned_on_lathe
+  Vec3 axis{0, 1, 0};                          ///< where heights grow to; any length
+};
+struct VolumeForm {
+  std::filesystem::path file;  ///< OpenVDB
+  std::string grid;            ///< empty: the first level set
+};
+struct MovingForm {
+  std::variant<MeshForm, LatheForm, VolumeForm> form;
+  Vec3 origin{0, 0, 0};  ///< where the form's zero is [m]
+  double voxel = 0;      ///< [m]; 0: a 128th of the longest side; not for volumes
+  std::optional<Drive> motion;
+};
+
+/// What a collider is drawn as.
+enum class Surface { Matte, Stone, Steel, Water };
+
 struct ColliderDescription {
   std::string name;
   std::string path;
-  std::variant<MovingShape, human::HumanSettings> solid;
+  std::variant<MovingShape, human::HumanSettings, MovingForm> solid;
   double friction = 0.3, restitution = 0;
+  Surface look = Surface::Matte;
   std::optional<Vec3> color;
 };
 
@@ -114,6 +127,7 @@ struct SceneDescription {
   double duration = 2, frame_rate = 60, tick_rate = 240, preroll = 0;
   double poster = -1;  ///< moment of a still picture [s]; < 0: the middle
   std::vector<SoftBody> bodies;
+  std::vector<ParticleBody> particles;
   std::vector<ColliderDescription> colliders;
   std::optional<CameraDescription> camera;
 };

@@ -1,4 +1,4 @@
-#include <scene/description.hpp>
+#include <scene/drive.hpp>
 
 #include <algorithm>
 #include <cmath>

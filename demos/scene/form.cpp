@@ -5,6 +5,8 @@
 #include <hooke/vdb/mesh_level_set.hpp>
 #include <hooke/vdb/volume_file.hpp>
 
+#include <Eigen/Geometry>
+
 #include <algorithm>
 #include <cmath>
 #include <numbers>
@@ -15,6 +17,13 @@ namespace {
 
 constexpr int kAround = 128;
 constexpr double kVoxelsASide = 128;
+
+TriangleMesh turned(const LatheForm& lathe) {
+  TriangleMesh mesh = turned_on_lathe(lathe.profile, kAround);
+  const Mat3 turn = Eigen::Quaterniond::FromTwoVectors(Vec3::UnitY(), lathe.axis).toRotationMatrix();
+  mesh.vertices = (mesh.vertices.matrix() * turn.transpose()).array().eval();
+  return mesh;
+}
 
 double longest_side(const TriangleMesh& mesh) {
   return (mesh.vertices.colwise().maxCoeff() - mesh.vertices.colwise().minCoeff()).maxCoeff();
@@ -77,7 +86,7 @@ Form make_form(const MovingForm& description) {
     return form;
   }
   const auto* file = std::get_if<MeshForm>(&description.form);
-  auto mesh = file ? io::read_obj(file->file) : turned_on_lathe(std::get<LatheForm>(description.form).profile, kAround);
+  auto mesh = file ? io::read_obj(file->file) : turned(std::get<LatheForm>(description.form));
   const double voxel = description.voxel > 0 ? description.voxel : longest_side(mesh) / kVoxelsASide;
   return {vdb::level_set_from_mesh(mesh, voxel), std::make_shared<const TriangleMesh>(std::move(mesh))};
 }

@@ -2,11 +2,16 @@
 
 #include <hooke/error.hpp>
 #include <hooke/method.hpp>
+#include <scene/parts.hpp>
 #include <scene/reader.hpp>
 
+#include <Eigen/Geometry>
+
+#include <algorithm>
 #include <cerrno>
 #include <cstring>
 #include <fstream>
+#include <numbers>
 #include <set>
 #include <sstream>
 
@@ -15,19 +20,7 @@ namespace hooke::scene {
 namespace {
 
 constexpr double kLongest = 1e6;  // [s]
-
-Range fraction() { return Range::between(0, 1, "from 0 to 1"); }
-
-Vec3 read_color(const Value& value) {
-  if (value.array() != 3) value.fail_got("must be an array of 3 numbers from 0 to 1");
-  return {value.at(0).number(fraction()), value.at(1).number(fraction()), value.at(2).number(fraction())};
-}
-
-Vec3 read_direction(const Value& value) {
-  const Vec3 direction = value.vec3();
-  if (!(direction.norm() > 1e-9) || !(direction.norm() < 1e150)) value.fail("must be a direction, not of length 0");
-  return direction;
-}
+constexpr std::size_t kMostProfile = 10000;
 
 Points<double> read_points(const Value& value, Index count = -1) {
   const Index n = Index(value.array());
@@ -64,30 +57,6 @@ std::vector<PointChoice> read_choices(const Value& value) {
     for (std::size_t i = 0; i < value.array(); ++i) one(value.at(i));
   }
   return out;
-}
-
-// translate, swing and keys of an opened object.
-Drive read_drive(const Object& object) {
-  Drive drive;
-  if (const auto keys = object.find("keys")) {
-    if (object.has("translate") || object.has("swing")) keys->fail("excludes translate and swing");
-    if (keys->array() == 0) keys->fail("must have at least one key");
-    for (std::size_t i = 0; i < keys->array(); ++i) {
-      const Object key(keys->at(i), "key");
-      drive.keys.push_back({key["time"].number(), key["offset"].vec3()});
-      if (i > 0 && !(drive.keys[i].time > drive.keys[i - 1].time))
-        key["time"].fail_got("must be later than the key before, " + std::to_string(drive.keys[i - 1].time) + " s");
-    }
-    return drive;
-  }
-  if (!object.has("translate") && !object.has("swing")) object.value().fail("needs translate, swing or keys");
-  drive.translate = object.vec3("translate", Vec3::Zero());
-  if (const auto found = object.find("swing")) {
-    const Object swing(*found, "swing");
-    drive.swing = swing["amplitude"].vec3();
-    drive.period = swing["period"].number(Range::positive(), "s");
-  }
-  return drive;
 }
 
 RawPoints read_raw(const Object& body) {
@@ -284,15 +253,22 @@ SoftBody read_soft(const Value& value, std::size_t number, const std::filesystem
   return body;
 }
 
-SoftBody read_body(const Value& value, std::size_t number, const std::filesystem::path& folder) {
+// Adds it to the scene and returns its name.
+std::string read_body(const Value& value, std::size_t number, const std::filesystem::path& folder,
+                      SceneDescription& scene) {
   if (!value.json().is_object()) value.fail_got("must be an object");
   const auto type = value.json().find("type");
   if (type == value.json().end()) value.fail("the key \"type\" is missing");
   const Value type_value(*type, value.file(), value.path() + ".type");
   const std::string kind = type_value.choice({"soft", "particles", "rigid"});
-  if (kind != "soft")
-    type_value.fail("bodies of type \"" + kind + "\" are not available in scene files yet; use \"soft\"");
-  return read_soft(value, number, folder);
+  if (kind == "rigid")
+    type_value.fail("bodies of type \"rigid\" are not available in scene files yet; use \"soft\" or \"particles\"");
+  if (kind == "particles") {
+    scene.particles.push_back(read_particles(value, number, folder));
+    return scene.particles.back().settings.name;
+  }
+  scene.bodies.push_back(read_soft(value, number, folder));
+  return scene.bodies.back().name;
 }
 
 human::HumanSettings read_human(const Object& object, const std::filesystem::path& folder) {
@@ -308,6 +284,58 @@ human::HumanSettings read_human(const Object& object, const std::filesystem::pat
   return human;
 }
 
+Box read_box(const Object& object) {
+  Box box;
+  box.center = object["center"].vec3();
+  const Value size = object["size"];
+  if (size.array() != 3) size.fail_got("must be an array of 3 numbers");
+  for (int k = 0; k < 3; ++k) box.half_extent[k] = size.at(std::size_t(k)).number(Range::positive(), "m") / 2;
+  if (const auto found = object.find("rotation")) {
+    const Object rotation(*found, "rotation");
+    const Vec3 axis = read_direction(rotation["axis"]).normalized();
+    box.axes =
+        Eigen::AngleAxisd(rotation["angle"].number(Range::any(), "degrees") * std::numbers::pi / 180, axis).matrix();
+  }
+  return box;
+}
+
+std::vector<std::array<double, 2>> read_profile(const Value& value) {
+  std::vector<std::array<double, 2>> profile;
+  const std::size_t count = value.array();
+  if (count < 2 || count > kMostProfile)
+    value.fail("must have from 2 to " + std::to_string(kMostProfile) + " points, got " + std::to_string(count));
+  for (std::size_t i = 0; i < count; ++i) {
+    const Value point = value.at(i);
+    if (point.array() != 2) point.fail_got("must be [radius, height]");
+    profile.push_back({point.at(0).number(Range::not_negative(), "m"), point.at(1).number(Range::any(), "m")});
+    if (i > 0 && profile[i] == profile[i - 1]) point.fail("is the same as the point before");
+    if (i > 0 && i + 1 < count && profile[i][0] == 0)
+      point.fail("only the first and the last point may be on the axis, at radius 0");
+  }
+  if (count == 2 && profile[0][0] == 0 && profile[1][0] == 0) value.fail("must have a point off the axis");
+  return profile;
+}
+
+MovingForm read_form(const Object& object, const std::string& type, const std::filesystem::path& folder) {
+  MovingForm solid;
+  if (type == "lathe") {
+    LatheForm lathe{read_profile(object["profile"])};
+    if (object.has("axis")) lathe.axis = read_direction(object["axis"]);
+    solid.form = lathe;
+    solid.origin = object["center"].vec3();
+  } else {
+    const std::filesystem::path file = folder / object["file"].text();
+    if (type == "mesh")
+      solid.form = MeshForm{file};
+    else
+      solid.form = VolumeForm{file, object.has("grid") ? object["grid"].text() : ""};
+    solid.origin = object.vec3("origin", solid.origin);
+  }
+  if (type != "level-set") solid.voxel = object.number("voxel", solid.voxel, Range::positive(), "m");
+  if (const auto motion = object.find("motion")) solid.motion = read_drive(Object(*motion, "motion"));
+  return solid;
+}
+
 MovingShape read_shape(const Object& object, const std::string& type) {
   MovingShape solid;
   if (type == "half-space") {
@@ -319,6 +347,8 @@ MovingShape read_shape(const Object& object, const std::string& type) {
   }
   if (type == "sphere") {
     solid.shape = Sphere{object["center"].vec3(), object["radius"].number(Range::positive(), "m")};
+  } else if (type == "box") {
+    solid.shape = read_box(object);
   } else {
     solid.shape = Capsule{object["a"].vec3(), object["b"].vec3(), object["radius"].number(Range::positive(), "m")};
   }
@@ -331,18 +361,25 @@ ColliderDescription read_collider(const Value& value, std::size_t number, const 
   const auto found = value.json().find("type");
   if (found == value.json().end()) value.fail("the key \"type\" is missing");
   const std::string type =
-      Value(*found, value.file(), value.path() + ".type").choice({"half-space", "sphere", "capsule", "human"});
-  const Object object(value, type == "half-space" ? "half_space" : type);
+      Value(*found, value.file(), value.path() + ".type")
+          .choice({"half-space", "sphere", "capsule", "box", "mesh", "lathe", "level-set", "human"});
+  const Object object(value, type == "half-space" ? "half_space" : type == "level-set" ? "level_set" : type);
   ColliderDescription collider;
   collider.path = value.path();
   collider.name = object.has("name") ? object["name"].text() : type + std::to_string(number);
   if (type == "human")
     collider.solid = read_human(object, folder);
+  else if (type == "mesh" || type == "lathe" || type == "level-set")
+    collider.solid = read_form(object, type, folder);
   else
     collider.solid = read_shape(object, type);
   collider.friction = object.number("friction", collider.friction, Range::not_negative());
   collider.restitution = object.number("restitution", collider.restitution, fraction());
   if (type != "half-space" && object.has("color")) collider.color = read_color(object["color"]);
+  if (type != "half-space" && type != "human" && object.has("look")) {
+    const std::vector<std::string> names{"matte", "stone", "steel", "water"};
+    collider.look = Surface(std::find(names.begin(), names.end(), object["look"].choice(names)) - names.begin());
+  }
   return collider;
 }
 
@@ -384,10 +421,9 @@ SceneDescription parse_scene(const std::string& text, const std::string& file, c
   const Value bodies = object["bodies"];
   std::set<std::string> names;
   for (std::size_t i = 0; i < bodies.array(); ++i) {
-    scene.bodies.push_back(read_body(bodies.at(i), i, folder));
-    if (!names.insert(scene.bodies.back().name).second)
-      Value(bodies.at(i).json(), file, bodies.at(i).path() + ".name")
-          .fail("two bodies are called \"" + scene.bodies.back().name + "\"");
+    const std::string name = read_body(bodies.at(i), i, folder, scene);
+    if (!names.insert(name).second)
+      Value(bodies.at(i).json(), file, bodies.at(i).path() + ".name").fail("two bodies are called \"" + name + "\"");
   }
   names.clear();
   if (const auto colliders = object.find("colliders"))

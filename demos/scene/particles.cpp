@@ -97,7 +97,7 @@ ParticleKind read_kind(const Value& value) {
   if (const auto color = object.find("color")) read_kind_color(*color, kind);
   if (const auto size = object.find("size")) kind.size = read_curve(*size, fraction(), "", Range::not_negative());
   if (const auto opacity = object.find("opacity")) {
-    if (kind.look == Look::Spark) opacity->fail("is for smoke, drops and water; sparks have \"intensity\"");
+    if (kind.look == Look::Spark) opacity->fail("is for smoke, drops and water");
     kind.opacity = read_curve(*opacity, fraction(), "", fraction());
   }
   if (const auto intensity = object.find("intensity")) {
@@ -296,23 +296,6 @@ std::vector<std::string> method_names() {
   return names;
 }
 
-// Air that a file describes; still outside of it.
-template <class S>
-class FieldFlow final : public particles::Flow<S> {
- public:
-  explicit FieldFlow(VelocityGrid grid) : grid_(std::move(grid)) {}
-  void add_velocity(const particles::Tile<S>& tile, const Vec3& origin, double, S* const u[3]) const override {
-    for (Index i = 0; i < tile.count; ++i) {
-      const Vec3 velocity =
-          grid_.velocity(origin + Vec3(double(tile.x[0][i]), double(tile.x[1][i]), double(tile.x[2][i])));
-      for (int k = 0; k < 3; ++k) u[k][i] += S(velocity[k]);
-    }
-  }
-
- private:
-  VelocityGrid grid_;
-};
-
 template <class S>
 std::unique_ptr<particles::Force<S>> make_force(const ParticleForce& says, const Vec3& origin) {
   const auto flow = [](auto made, double rate) -> std::unique_ptr<particles::Force<S>> {
@@ -335,10 +318,8 @@ std::unique_ptr<particles::Force<S>> make_force(const ParticleForce& says, const
                                                        air->updraught),
                 air->rate);
   if (const auto* air = std::get_if<VelocityField>(&says)) {
-    const VelocityGrid grid = vdb::read_velocity_field(air->file, air->grid);
-    return flow(std::make_unique<FieldFlow<S>>(
-                    VelocityGrid(grid.lower() + origin + air->place, grid.voxel(), grid.counts(), grid.values())),
-                air->rate);
+    auto grid = std::make_shared<const VelocityGrid>(vdb::read_velocity_field(air->file, air->grid));
+    return flow(std::make_unique<particles::GridFlow<S>>(std::move(grid), origin + air->place), air->rate);
   }
   const auto& apart = std::get<Repulsion>(says);
   return std::make_unique<particles::Repulsion<S>>(apart.stiffness, apart.distance);

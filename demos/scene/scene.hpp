@@ -40,23 +40,27 @@ struct SceneHuman {
 struct Scene {
   World world;
   SceneDescription description;
-  std::vector<SceneBody> bodies;  ///< in the world's order
+  std::vector<SceneBody> bodies;          ///< in the world's order
+  std::vector<SceneParticles> particles;  ///< in the world after them
   std::vector<SceneHuman> humans;
+  /// By collider: what is drawn at the offset of its level set; null where its shapes are drawn.
+  std::vector<std::shared_ptr<const TriangleMesh>> meshes;
 
   /// The time that is shown: the world's minus the preroll [s].
   double shown_time() const { return world.time() - description.preroll; }
 };
 
 /// Reads the files that the description names and builds everything.
-/// @param reuse an earlier scene of the same colliders, whose humans are taken over (a human
+/// @param reuse an earlier scene of the same colliders, whose humans and level sets are taken over (a human
 ///              costs seconds)
 /// @throws hooke::Error naming file, path, rule and value
 Scene build(const SceneDescription& description, const Scene* reuse = nullptr);
 
 /// Sets the solver of every body: what is given on the command line.
+/// Throws hooke::Error where a body has no such method or precision.
 void override_solver(SceneDescription& description, const std::string& method, double dt, const std::string& precision);
 
-/// Lets the chooser pick the solver of every body: `error` is a share of each body's size, > 0.
+/// Lets the chooser pick the solver of every soft body: `error` is a share of each body's size, > 0.
 void choose_solvers(SceneDescription& description, double error);
 
 }  // namespace hooke::scene

@@ -86,6 +86,111 @@ TEST_F(Command, ExportsMovingMeshes) {
   EXPECT_EQ(std::filesystem::file_size(folder_ / "run/x_y.pc2"), 32u + 7 * 9 * 12);
 }
 
+const std::string kJet =
+    R"("duration": 0.5, "frame_rate": 20, "colliders": [{"type": "half-space", "restitution": 0.5}],
+    "bodies": [{"type": "particles", "name": "a jet", "capacity": 150, "emitters": [
+       {"position": [0, 0.2, 0], "axis": [1, 0, 0], "spread": 30, "rate": 500, "speed": [1, 2], "lifetime": [0.2, 0.4], "mass": 0.01}],
+       "forces": [{"force": "turbulence", "speed": 1, "size": 0.2, "rate": 3}],
+       "kinds": [{"name": "k"}, {"name": "bit"}],
+       "sub_emitters": [{"on": "impact", "parent": "k", "kind": "bit", "count": 1, "lifetime": 0.1, "mass": 0.01}]},
+      {"type": "soft", "name": "rag", "grid": {"size": [1, 1], "points": [4, 4]}, "origin": [0, 2, 0], "pin": "top"}])";
+
+TEST_F(Command, ParticlesHaveStateCountsAndEnergies) {
+  const Result result = run("simulate " + scene(kJet) + " --out " + out());
+  ASSERT_EQ(result.code, 0) << result.err;
+  EXPECT_THAT(result.out, HasSubstr("a jet: "));
+  EXPECT_THAT(result.out, HasSubstr(" of at most 150 particles, 1 emitter, 1 force, 1 sub-emitter, 2 kinds; verlet"));
+  EXPECT_THAT(result.out, HasSubstr("a jet: no error estimate"));
+  EXPECT_THAT(result.out, HasSubstr("rag: error estimate"));
+  const auto counts = lines_of(contents(folder_ / "run/particles.csv"));
+  ASSERT_EQ(counts.size(), 1u + 11u);
+  EXPECT_EQ(counts[0], "time,body,alive,born,died,refused,displaced,impacts");
+  long alive = 0, born = 0, died = 0, refused = 0, displaced = 0, impacts = 0;
+  double time = 0, before = -1;
+  long born_before = 0;
+  for (std::size_t i = 1; i < counts.size(); ++i) {
+    ASSERT_EQ(std::sscanf(counts[i].c_str(), "%lf,a jet,%ld,%ld,%ld,%ld,%ld,%ld", &time, &alive, &born, &died, &refused,
+                          &displaced, &impacts),
+              7)
+        << counts[i];
+    EXPECT_GT(time, before);
+    EXPECT_EQ(alive, born - died - displaced);
+    EXPECT_LE(alive, 150);
+    EXPECT_GE(born, born_before);
+    before = time, born_before = born;
+  }
+  EXPECT_EQ(counts[1], "0,a jet,0,0,0,0,0,0");
+  EXPECT_NEAR(time, 0.5, 1e-9);
+  EXPECT_GT(died, 20);
+  EXPECT_GT(impacts, 0);
+  EXPECT_GT(refused, 0) << "500/s for 0.3 s are 150, and children beside";
+  // The soft body's 16 points first, then who is alive.
+  const auto state = lines_of(contents(folder_ / "run/state.csv"));
+  ASSERT_EQ(long(state.size()), 1 + 16 + alive);
+  EXPECT_THAT(state[1], ::testing::StartsWith("rag,0,"));
+  EXPECT_THAT(state[17], ::testing::StartsWith("a jet,0,"));
+  // Their energy counts: 0.01 kg at 1 to 2 m/s.
+  const auto diagnostics = lines_of(contents(folder_ / "run/diagnostics.csv"));
+  double kinetic = 0;
+  ASSERT_EQ(std::sscanf(diagnostics[5].c_str(), "%lf,%lf", &time, &kinetic), 2);
+  EXPECT_GT(kinetic, 100 * 0.5 * 0.01 * 0.5);
+}
+
+TEST_F(Command, ParticlesGiveTheSameBytesAtAnyThreadCount) {
+  const std::string file =
+      scene(R"("duration": 0.4, "colliders": [{"type": "sphere", "center": [0.3, 0.2, 0], "radius": 0.2}],
+    "bodies": [{"type": "particles", "name": "p", "capacity": 40000, "contact": {"restitution": 0.5}, "emitters": [
+       {"shape": "sphere", "radius": 0.3, "spread": 90, "bursts": [{"count": 15000, "period": 0.2}], "lifetime": [0.3, 1]}],
+       "kinds": [{"name": "k"}, {"name": "bit"}],
+       "sub_emitters": [{"on": "impact", "parent": "k", "kind": "bit", "count": [0, 2], "lifetime": 0.1}]}])");
+  ASSERT_EQ(run("simulate " + file + " --out " + out()).code, 0);
+  ASSERT_EQ(run("simulate " + file + " --threads 3 --out " + out() + "2").code, 0);
+  for (const char* name : {"state.csv", "diagnostics.csv", "particles.csv"})
+    EXPECT_EQ(contents(folder_ / "run" / name), contents(folder_ / "run2" / name)) << name;
+}
+
+TEST_F(Command, ExportsParticlesOneFileAFrame) {
+  for (const char* format : {"ply", "csv", "vdb"}) {
+    const Result result =
+        run("simulate " + scene(kJet) + " --no-error-estimate --export " + format + " --out " + out());
+    EXPECT_EQ(result.code, 0) << result.err;
+    for (const char* frame : {"0000", "0010"})
+      EXPECT_TRUE(exists(folder_ / ("run/a_jet." + std::string(frame) + "." + format))) << format << frame;
+    EXPECT_EQ(result.out.find("rag: not exported") != std::string::npos, std::string(format) != "ply") << format;
+  }
+  EXPECT_TRUE(exists(folder_ / "run/rag.0010.ply"));
+  // The points of the export are those of the state.
+  const auto points = lines_of(contents(folder_ / "run/a_jet.0010.csv"));
+  const auto state = lines_of(contents(folder_ / "run/state.csv"));
+  EXPECT_EQ(points[0], "index,x,y,z,vx,vy,vz,id,age,radius");
+  ASSERT_EQ(points.size() - 1, state.size() - 17);
+  EXPECT_EQ(points[1].substr(0, 20), state[17].substr(6, 20));
+  const Result meshes = run("simulate " + scene(kJet) + " --no-error-estimate --export obj --out " + out());
+  EXPECT_EQ(meshes.code, 0);
+  EXPECT_THAT(meshes.out, HasSubstr("a jet: not exported, obj is for soft bodies"));
+}
+
+TEST_F(Command, WhatParticlesDoNotHaveIsToldInOneLine) {
+  const std::string jet = scene(R"("bodies": [{"type": "particles", "name": "p", "emitters": [{"rate": 10}]}])");
+  const std::string rag = folder_.write("rag.json", R"({"hooke": 1, )" + kPendulum + "}").string();
+  for (const auto& [arguments, words] : std::vector<std::pair<std::string, std::string>>{
+           {jet + " --method filtered-leapfrog", "particles \"p\": the method must be one of explicit-euler"},
+           {jet + " --precision double-float", "particles \"p\": the precision must be float or double"},
+           {jet + " --error 0.01", "--error is for soft bodies"},
+           {jet + " --export obj", "--export obj is for soft bodies"},
+           {rag + " --export vdb", "--export vdb is for particles"}}) {
+    const Result result = run("simulate " + arguments + " --out " + out());
+    EXPECT_EQ(result.code, 2) << arguments;
+    EXPECT_THAT(result.err, HasSubstr(words));
+    EXPECT_EQ(lines_of(result.err).size(), 1u) << result.err;
+    EXPECT_FALSE(exists(folder_ / "run")) << arguments;
+  }
+  const Result valid = run("validate " + jet);
+  EXPECT_EQ(valid.code, 0);
+  EXPECT_THAT(valid.out, HasSubstr("p: particles of the kinds particle"));
+  EXPECT_THAT(valid.out, HasSubstr("valid"));
+}
+
 TEST_F(Command, ABlowUpIsExitCodeOneAndKeepsTheLastGoodState) {
   const Result result = run("simulate " + scene(R"("duration": 20, "tick_rate": 60, "bodies": [
       {"type": "soft", "name": "stiff", "grid": {"size": [1, 1], "points": [6, 6]}, "pin": "top",

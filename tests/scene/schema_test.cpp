@@ -38,6 +38,9 @@ TEST(Schema, ListsTheMethodsThereAre) {
   names.emplace_back(softbody::filtered_leapfrog().name);
   EXPECT_THAT(schema["$defs"]["solver"]["properties"]["method"]["enum"].get<std::vector<std::string>>(),
               ::testing::UnorderedElementsAreArray(names));
+  names.pop_back();
+  EXPECT_THAT(schema["$defs"]["particle_solver"]["properties"]["method"]["enum"].get<std::vector<std::string>>(),
+              ::testing::UnorderedElementsAreArray(names));
 }
 
 TEST(Manual, DescribesEveryKeyOfEveryObject) {
