@@ -3,6 +3,7 @@
 #include <hooke/linear_bodies.hpp>
 #include <scene/fput.hpp>
 #include <scene/scene.hpp>
+#include <scene/spray.hpp>
 
 #include <cmath>
 #include <memory>
@@ -426,8 +427,9 @@ SceneDescription hanging_sheet(int n) {
 
 std::vector<StandardScene> standard_scenes() {
   std::vector<StandardScene> out;
-  for (const auto& make : {oscillator, throw_with_linear_drag, throw_with_quadratic_drag, ship, bouncing_ball,
-                           elastic_pendulum, stiff_pendulum, fput_chain, tumbling_net, jelly_in_flight})
+  for (const auto& make :
+       {oscillator, throw_with_linear_drag, throw_with_quadratic_drag, spray_with_linear_drag, rain_with_quadratic_drag,
+        ship, bouncing_ball, elastic_pendulum, stiff_pendulum, fput_chain, tumbling_net, jelly_in_flight})
     out.push_back(make());
   for (const int n : {32, 64, 128}) out.push_back(sheet(n));
   for (const auto& make : {stiff_sheet, sheet_over_sphere, settling_cloth}) out.push_back(make());

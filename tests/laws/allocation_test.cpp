@@ -1,4 +1,7 @@
 // No allocation in a step: once a world runs, it asks for no memory.
+#ifdef HOOKE_TESTS_PARTICLES
+#include <hooke/particles/particle_system.hpp>
+#endif
 #include <hooke/softbody/soft_body.hpp>
 #include <hooke/world.hpp>
 
@@ -115,6 +118,44 @@ const Case kCases[] = {Case{"Undamped"},
 
 INSTANTIATE_TEST_SUITE_P(Laws, NoAllocation, testing::ValuesIn(kCases),
                          [](const auto& test) { return test.param.name; });
+
+#ifdef HOOKE_TESTS_PARTICLES
+// Ten minutes of jets that fall on a ball and into a basin: as many drops at the end as at the start, and no memory.
+TEST(NoAllocationOf, AFountainForTenMinutes) {
+  using namespace particles;
+  World world;
+  Collider floor, ball;
+  floor.name = "floor", floor.shapes = {HalfSpace{}}, floor.restitution = 0.3;
+  ball.name = "ball", ball.shapes = {Sphere{{0, 0.2, 0}, 0.3}}, ball.restitution = 0.2;
+  world.add_collider(floor), world.add_collider(ball);
+  ParticleSettings settings;
+  settings.capacity = 2000;
+  auto& system = world.add(std::make_unique<ParticleSystem<float>>(settings));
+  system.add_force(std::make_unique<particles::LinearDrag<float>>(0.05));
+  EmitterSettings jet;
+  jet.position = {0, 0.6, 0}, jet.spread = 0.15, jet.speed = {4, 5}, jet.rate = 300, jet.lifetime = {1, 2};
+  system.add_emitter(jet);
+  SubEmitterSettings splash;
+  splash.on = SubEmitterSettings::On::Impact, splash.count = {1, 2}, splash.least_impact = 2, splash.lifetime = 0.3;
+  system.add_sub_emitter(splash);
+  ASSERT_TRUE(world.update(20).good());
+  const long before = requests;
+  Index least = system.size();
+  double first = 0, last = 0;  // mean counts of the first and the last two minutes
+  for (int second = 20; second < 600; ++second) {
+    ASSERT_TRUE(world.update(1).good());
+    least = std::min(least, system.size());
+    if (second < 140) first += double(system.size()) / 120;
+    if (second >= 480) last += double(system.size()) / 120;
+  }
+  EXPECT_EQ(requests - before, 0);
+  EXPECT_GT(least, 500);
+  EXPECT_NEAR(last / first, 1, 0.02) << first << " to " << last;
+  EXPECT_EQ(system.counts().refused, 0);
+  const Counts& counts = system.counts();
+  EXPECT_EQ(counts.born - counts.died, system.size());
+}
+#endif
 
 #endif
 

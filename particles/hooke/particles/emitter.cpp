@@ -157,6 +157,7 @@ Birth Emitter::birth(double time, std::uint64_t number) const {
   birth.mass = s.mass.at(share(7));
   birth.size = s.size.at(share(8));
   birth.kind = s.kind;
+  birth.number = number;
   return birth;
 }
 
@@ -185,9 +186,10 @@ void Emitter::births(double t0, double t1, std::vector<Birth>& out) const {
     const double time = s.start + s.rate.inverse_integral(s.rate.integral(0) + k + 0.5);
     out.push_back(birth(std::clamp(time, t0, t1), std::uint64_t(k)));
   }
+  // Without memory of its own, as a stable sort would need.
   if (!s.bursts.empty())
-    std::stable_sort(out.begin() + std::ptrdiff_t(first), out.end(),
-                     [](const Birth& a, const Birth& b) { return a.time < b.time; });
+    std::sort(out.begin() + std::ptrdiff_t(first), out.end(),
+              [](const Birth& a, const Birth& b) { return a.time != b.time ? a.time < b.time : a.number < b.number; });
 }
 
 }  // namespace hooke::particles

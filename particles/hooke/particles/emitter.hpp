@@ -79,6 +79,7 @@ struct Birth {
   double lifetime = std::numeric_limits<double>::infinity();
   double mass = 1, size = 0.01;
   int kind = 0;
+  std::uint64_t number = 0;  ///< in its emitter's count
 };
 
 /// Holds no state but its settings: births between two times can be asked for again.

@@ -130,6 +130,7 @@ struct ParticleSystem<S>::Worker {
     const std::size_t each = std::size_t(tile) + std::size_t(Tile<S>::kLanes);
     memory.assign(12 * each, S(0));
     marks.assign(each, S(1));
+    hits.reserve(4 * each), events.reserve(4 * each), dying.reserve(64);
     S* at = memory.data();
     for (auto* arrays : {a, predicted, x0, v0})
       for (int k = 0; k < 3; ++k, at += each) arrays[k] = at;
@@ -211,6 +212,9 @@ ParticleSystem<S>::ParticleSystem(ParticleSettings settings)
   for (Index i = n; i-- > 0;) free_.push_back(std::uint32_t(i));
   for (Index i = 0; i < settings_.trail; ++i) trail_.emplace_back(n, 3);
   trail_length_.assign(settings_.trail > 0 ? std::size_t(n) : 0, 0);
+  // Room for what comes and goes in a tick.
+  const std::size_t events = 256 + std::size_t(n) / 8;
+  events_.reserve(events), born_.reserve(events), dead_.reserve(events), removed_.reserve(events);
   plan_ = std::make_unique<Plan>();
   newborn_ = std::make_unique<Worker>(Tile<S>::kLanes);
 }
@@ -701,7 +705,7 @@ void ParticleSystem<S>::move(Tile<S> tile, Index first, Plan& plan, Worker& w) {
     Event event;
     event.on = SubEmitterSettings::On::Impact;
     event.particle = std::max<Index>(first, 0) + hit.particle;
-    event.leg = hit.leg;
+    event.order = int(&hit - w.hits.data());
     event.time = plan.ends[std::min(std::size_t(hit.leg) + 1, plan.ends.size() - 1)];
     event.serial = tile.serial[hit.particle];
     event.kind = kind_[std::size_t(event.particle)];
@@ -779,8 +783,9 @@ void ParticleSystem<S>::simulate_tick(const Tick& tick) {
   }
   std::sort(dead_.begin(), dead_.end());
   // A particle's impacts are in order; particles are not, where threads share them.
-  std::stable_sort(events_.begin(), events_.end(),
-                   [](const Event& a, const Event& b) { return a.particle < b.particle; });
+  std::sort(events_.begin(), events_.end(), [](const Event& a, const Event& b) {
+    return a.particle != b.particle ? a.particle < b.particle : a.order < b.order;
+  });
   counts_.impacts += std::int64_t(events_.size());
 }
 

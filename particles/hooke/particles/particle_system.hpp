@@ -131,7 +131,7 @@ class ParticleSystem final : public Body {
   struct Event {
     SubEmitterSettings::On on;
     Index particle;  // where it is now; the parent's data are copied
-    int leg;
+    int order;       // among the events of its tile
     double time;
     std::uint64_t serial;
     int kind;
