@@ -15,7 +15,7 @@ namespace {
 constexpr int kGlowSteps = 64;  // of a life
 
 // Water: whoever has this many others within some radii is part of a stream, the rest are drops.
-constexpr int kTogether = 7;
+constexpr int kTogether = 6;
 constexpr double kNear = 2.6;           // [radii]
 constexpr double kVoxelsARadius = 1.9;  // of the surface
 constexpr int kSmoothing = 3;
@@ -116,6 +116,8 @@ void ParticleShot::append(std::vector<render::Model>& out) const {
     render::Model model;
     model.mesh = &groups_[k].surface;
     model.material = render::water();
+    model.material.stream = true;
+    model.material.color = kinds_[k].color(0);
     out.push_back(model);
   }
 }

@@ -10,11 +10,11 @@ namespace {
 constexpr double kCell = 0.0125;       // [m]
 constexpr double kWaveSpeed = 0.40;    // [m/s], of ripples some centimetres long
 constexpr double kCalmTime = 0.55;     // [s] in which waves fade
-constexpr double kFoamTime = 0.45;     // [s] in which foam fades
+constexpr double kFoamTime = 0.4;      // [s] in which foam fades
 constexpr double kFoamDrift = 1.5e-3;  // [m²/s]
 constexpr double kReach = 0.02;        // [m] around a drop that it pushes
 constexpr double kPush = 9.0;          // [m/s] of the surface for each [N s]
-constexpr double kFoam = 95;           // for each [N s]
+constexpr double kFoam = 34;           // for each [N s]
 constexpr double kMostFoam = 2.5, kSteepest = 0.25;
 constexpr double kDensity = 1000;  // [kg/m³]
 

@@ -21,6 +21,7 @@ constexpr double kShutter = 0.5;           // open for this share of a frame
 constexpr double kStray = 0.02;            // share of the particles at either end that the picture need not hold
 constexpr double kWetness = 0.7;           // of stone beside water
 constexpr double kPoolStart = 2;           // [s] of drops that fell in before the first picture
+constexpr double kPoolRim = 2;             // water shows by what it mirrors
 const Vec3 kPoolFloor{0.09, 0.10, 0.115};  // drops are seen by the light they bend: before a dark ground
 constexpr double kCrease = 40 * std::numbers::pi / 180;
 const Vec3 kClothColor{0.42, 0.022, 0.028}, kInsideColor{0.05, 0.04, 0.045}, kSolidColor{0.40, 0.42, 0.45};
@@ -222,7 +223,7 @@ render::Camera Shot::camera_at(std::size_t frame) const {
 render::Look Shot::look() const {
   if (any({scene::Look::Spark})) return render::workshop_for(camera_at(0));
   render::Look look = render::look_for(camera_at(0));
-  if (any({scene::Look::Drop, scene::Look::Water})) look.floor_color = kPoolFloor;
+  if (any({scene::Look::Drop, scene::Look::Water})) look.floor_color = kPoolFloor, look.rim_intensity = kPoolRim;
   return look;
 }
 

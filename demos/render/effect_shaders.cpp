@@ -273,6 +273,7 @@ uniform sampler2D scene;
 uniform mat4 to_clip;
 uniform vec3 outside_color;
 uniform float roughness;
+uniform int stream;
 out vec4 light;
 
 float hash(vec3 c) {
@@ -326,9 +327,21 @@ void main() {
   vec3 left = pow(max(outside_color, vec3(0.01)), vec3(way / 0.1));
   vec3 through = texture(scene, at / picture).rgb * left + outside_color * (1.0 - left) * 0.08 * (sky_color + 0.5 * key_color);
 
+  // A stream is round: its far side bends the light once more, as a drop's does.
+  if (stream == 1) {
+    vec3 within = refract(-v, n, 0.75), far_n = n - 2.0 * dot(n, within) * within;
+    vec3 beyond = refract(within, -far_n, 1.333);
+    if (dot(beyond, beyond) < 0.5) beyond = within;
+    vec4 clip = to_clip * vec4(place + 1.2 * beyond, 1);
+    vec2 q = clip.xy / max(clip.w, 1e-3) * 0.5 + 0.5, margin = min(q, 1.0 - q);
+    float shown = clip.w > 0.05 ? clamp(20.0 * min(margin.x, margin.y), 0.0, 1.0) : 0.0;
+    through = mix(mirrored(beyond, 0.15), texture(scene, clamp(q, 0.0, 1.0)).rgb, shown);
+    through = min(through, 10.0) * outside_color;
+  }
+
   // Mirrored: what of the solid picture the ray meets, else the studio.
   vec3 r = reflect(-v, n);
-  vec3 mirror = mirrored(r, 0.5 * roughness);
+  vec3 mirror = mirrored(r, stream == 1 ? 0.12 : 0.5 * roughness);
   float stride = 0.03;
   int steps = r.y > -0.2 ? 14 : 0;
   float found = 0.0;

@@ -608,6 +608,7 @@ void Stage::Studio::draw_water(std::span<const Model> models, const Frame& frame
     if (!is_water(models[i])) continue;
     water.set("outside_color", models[i].material.color);
     water.set("roughness", models[i].material.roughness);
+    water.set("stream", models[i].material.stream ? 1 : 0);
     uploaded[i].draw(uploaded[i].surface->all());
   }
 }

@@ -37,6 +37,7 @@ struct Material {
   double roughness = 0.55;  ///< in (0, 1]; higher spreads and dims the highlight (matte) or sheen (cloth)
   double weave = 700;       ///< cloth: threads per metre, 0 for none; drawn only where the model has uv
   double wetness = 0;       ///< stone: in [0, 1]; wet stone is darker and shines
+  bool stream = false;  ///< water: thin and round, so that its far side bends light too; else a body's upper surface
 };
 
 /// Materials with the studio's values for them.
