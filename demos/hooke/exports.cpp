@@ -4,6 +4,7 @@
 #include <hooke/io/point_file.hpp>
 #include <hooke/io/tables.hpp>
 #include <hooke/vdb/particle_file.hpp>
+#include <hooke/vdb/surface.hpp>
 
 #include <set>
 
@@ -11,7 +12,7 @@ namespace hooke::command {
 
 namespace {
 
-// A body's name as part of a file name; different bodies get different ones.
+// A name as part of a file name; different ones stay different.
 std::string file_name(const std::string& name, std::set<std::string>& taken) {
   std::string out;
   for (const char c : name)
@@ -20,6 +21,8 @@ std::string file_name(const std::string& name, std::set<std::string>& taken) {
   for (int i = 2; !taken.insert(unique).second; ++i) unique = out.substr(0, 100) + "-" + std::to_string(i);
   return unique;
 }
+
+constexpr double kVoxelsARadius = 2;  // of fog volumes and surfaces
 
 bool for_meshes(const std::string& format) { return format == "obj" || format == "ply" || format == "pc2"; }
 bool for_points(const std::string& format) { return format == "ply" || format == "csv" || format == "vdb"; }
@@ -79,7 +82,8 @@ void Exports::write(const scene::SceneParticles& particles, const std::string& n
     columns.velocities = velocities;
     columns.radii = view.radii.cast<double>();
     columns.ids.assign(view.serials.begin(), view.serials.end());
-    return vdb::write_points(path, positions, columns);
+    vdb::write_points(path, positions, columns);
+    return write_volumes(particles, view, name);
   }
   io::PointTable table;
   table.positions = positions, table.velocities = velocities;
@@ -90,6 +94,28 @@ void Exports::write(const scene::SceneParticles& particles, const std::string& n
     io::write_ply_points(path, table);
   else
     io::write_csv_points(path, table);
+}
+
+void Exports::write_volumes(const scene::SceneParticles& particles, const scene::ParticleView& view,
+                            const std::string& name) const {
+  const Points<double> positions = particles.body().positions(), velocities = particles.body().velocities();
+  std::set<std::string> taken;
+  for (std::size_t k = 0; k < particles.kinds().size(); ++k) {
+    const scene::ParticleKind& kind = particles.kinds()[k];
+    const std::string kind_name = file_name(kind.name, taken);
+    if (kind.look != scene::Look::Smoke && kind.look != scene::Look::Water) continue;
+    std::vector<Index> rows;
+    for (Index i = 0; i < positions.rows(); ++i)
+      if (view.kinds[std::size_t(i)] == int(k) && view.radii[i] > 0) rows.push_back(i);
+    if (rows.empty()) continue;
+    const Values<double> radii = view.radii(rows).cast<double>();
+    const double voxel = radii.mean() / kVoxelsARadius;
+    const std::filesystem::path path = io::frame_name(folder_, name + "." + kind_name, frame_, ".vdb");
+    if (kind.look == scene::Look::Smoke)
+      vdb::write_density(path, positions(rows, Eigen::all), radii, voxel, velocities(rows, Eigen::all));
+    else
+      vdb::write_surface_level_set(path, positions(rows, Eigen::all), radii, voxel);
+  }
 }
 
 CountsTable::CountsTable(const std::filesystem::path& path) : file_(path, io::OutputFile::Leftover::Keep) {

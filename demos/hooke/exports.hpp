@@ -15,7 +15,8 @@ namespace hooke::command {
 /// Throws hooke::Error unless `format` is obj, ply, pc2, csv or vdb.
 void check_export_format(const std::string& format);
 
-/// Soft bodies as obj, ply or pc2; particles as one file a frame: ply, csv or vdb.
+/// Soft bodies as obj, ply or pc2; particles as one file a frame: ply, csv or vdb. As vdb smoke is also written as
+/// a fog volume and water as the level set of its surface.
 class Exports {
  public:
   /// @param format empty: nothing is written
@@ -31,6 +32,8 @@ class Exports {
 
  private:
   void write(const scene::SceneParticles& particles, const std::string& name) const;
+  void write_volumes(const scene::SceneParticles& particles, const scene::ParticleView& view,
+                     const std::string& name) const;
 
   const scene::Scene& scene_;
   std::string format_, left_out_;

@@ -165,6 +165,14 @@ TEST_F(Command, ExportsParticlesOneFileAFrame) {
   EXPECT_EQ(points[0], "index,x,y,z,vx,vy,vz,id,age,radius");
   ASSERT_EQ(points.size() - 1, state.size() - 17);
   EXPECT_EQ(points[1].substr(0, 20), state[17].substr(6, 20));
+  // Smoke is a volume and water a surface as well.
+  const std::string seen = R"("duration": 0.05, "bodies": [{"type": "particles", "name": "p",
+      "emitters": [{"rate": 2000, "kind": "fog"}, {"rate": 2000, "position": [1, 0, 0], "kind": "wet"}],
+      "kinds": [{"name": "fog", "look": "smoke"}, {"name": "wet", "look": "water"}, {"name": "lit"}]}])";
+  EXPECT_EQ(run("simulate " + scene(seen) + " --export vdb --out " + out()).code, 0);
+  for (const char* file : {"p.0003.vdb", "p.fog.0003.vdb", "p.wet.0003.vdb"})
+    EXPECT_TRUE(exists(folder_ / "run" / file)) << file;
+  EXPECT_FALSE(exists(folder_ / "run/p.lit.0003.vdb"));
   const Result meshes = run("simulate " + scene(kJet) + " --no-error-estimate --export obj --out " + out());
   EXPECT_EQ(meshes.code, 0);
   EXPECT_THAT(meshes.out, HasSubstr("a jet: not exported, obj is for soft bodies"));
