@@ -14,7 +14,7 @@ constexpr double kFoamTime = 0.4;      // [s] in which foam fades
 constexpr double kFoamDrift = 1.5e-3;  // [m²/s]
 constexpr double kReach = 0.02;        // [m] around a drop that it pushes
 constexpr double kPush = 9.0;          // [m/s] of the surface for each [N s]
-constexpr double kFoam = 34;           // for each [N s]
+constexpr double kFoam = 55;           // for each [N s]
 constexpr double kMostFoam = 2.5, kSteepest = 0.25;
 constexpr double kDensity = 1000;  // [kg/m³]
 
@@ -110,7 +110,9 @@ void Pool::advance(std::span<const scene::ParticleView> drops, std::span<const s
       const Vec3 v = view.velocities.row(i).matrix().transpose().cast<double>();
       const double gap = x.y() - level_;
       if (!(v.y() < 0 && gap > -kCell && gap <= -v.y() * seconds)) continue;
-      const double radius = view.radii[i], mass = kDensity * 4.19 * radius * radius * radius;
+      // A ball of a stream is as large as the gaps between them.
+      const double radius = view.radii[i] * (look == scene::Look::Water ? 0.6 : 1.0),
+                   mass = kDensity * 4.19 * radius * radius * radius;
       fall_in(x - v * (gap / v.y()), mass * -v.y());
     }
   }

@@ -31,7 +31,7 @@ render::Material material_of(scene::Surface look, const std::optional<Vec3>& col
   material.color = kSolidColor;
   if (look == scene::Surface::Stone) material = render::sandstone();
   if (look == scene::Surface::Steel) material = render::steel();
-  if (look == scene::Surface::Water) material = render::water();
+  if (look == scene::Surface::Water) material = render::water();  // a pool
   if (color) material.color = *color;
   if (look == scene::Surface::Stone || look == scene::Surface::Steel) material.inside_color = material.color;
   if (look == scene::Surface::Stone && wet) material.wetness = kWetness;
@@ -116,6 +116,7 @@ void Shot::add_colliders() {
     if (says.look == scene::Surface::Water && set && !colliders[i].motion) {
       colliders_.pop_back();
       pools_.emplace_back(*set);
+      waters_.push_back(material_of(says.look, says.color, false));
       continue;
     }
     meshes_.push_back(scene_.meshes[i] ? with_creases(*scene_.meshes[i], kCrease) : TriangleMesh{});
@@ -336,7 +337,7 @@ render::Image Shot::draw(render::Stage& stage, std::size_t frame) {
   for (std::size_t i = 0; i < pools_.size(); ++i) {
     render::Model model;
     model.mesh = &pools[i];
-    model.material = render::water();
+    model.material = waters_[i];
     model.cover = &pools_[i].foam();
     models.push_back(model);
   }

@@ -64,6 +64,7 @@ class Shot {
   std::vector<std::size_t> colliders_;    // those that are not humans
   std::vector<TriangleMesh> meshes_;      // of those, where they are level sets
   std::vector<Pool> pools_;               // colliders that are drawn as water
+  std::vector<render::Material> waters_;  // theirs
   std::size_t pool_frame_ = 0;            // what the pools show
   std::size_t pictures_ = 0;              // drawn so far
   Vec3 lower_{0, 0, 0}, upper_{0, 0, 0};  // of everything in all frames

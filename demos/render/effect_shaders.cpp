@@ -335,7 +335,7 @@ void main() {
     vec4 clip = to_clip * vec4(place + 1.2 * beyond, 1);
     vec2 q = clip.xy / max(clip.w, 1e-3) * 0.5 + 0.5, margin = min(q, 1.0 - q);
     float shown = clip.w > 0.05 ? clamp(20.0 * min(margin.x, margin.y), 0.0, 1.0) : 0.0;
-    through = mix(mirrored(beyond, 0.15), texture(scene, clamp(q, 0.0, 1.0)).rgb, shown);
+    through = mix(mirrored(beyond, 0.3), texture(scene, clamp(q, 0.0, 1.0)).rgb, 0.5 * shown);
     through = min(through, 10.0) * outside_color;
   }
 
@@ -360,6 +360,13 @@ void main() {
   }
   mirror = mix(mirror, met, found);
   vec3 result = mix(through, mirror, fresnel);
+  float wrap = clamp((dot(n, key_direction) + 0.3) / 1.3, 0.0, 1.0);
+  // Air that a stream takes along scatters light.
+  if (stream == 1) {
+    float behind_light = pow(clamp(dot(-v, rim_direction), 0.0, 1.0), 3.0);
+    float side_light = clamp((dot(n, rim_direction) + 0.4) / 1.4, 0.0, 1.0);
+    result = mix(result, 0.8 * (key_color * wrap + rim_color * (0.5 * side_light + behind_light) + sky_color), 0.28);
+  }
 
   // Foam: a lace of bubbles, closed where there is much.
   float lace = 0.0;
@@ -370,7 +377,6 @@ void main() {
   }
   float thin = 1.0 - side;
   float foam = smoothstep(thin - 0.12, thin + 0.30, lace + 0.25 * side) * smoothstep(0.0, 0.15, side);
-  float wrap = clamp((dot(n, key_direction) + 0.3) / 1.3, 0.0, 1.0);
   vec3 white = vec3(0.72, 0.76, 0.78) * (0.62 + 0.45 * lace) * (key_color * wrap * 0.8 + sky_color);
   light = vec4(mix(result, white, 0.88 * foam), 1);
 })";
