@@ -26,6 +26,7 @@ std::unique_ptr<Body> system_of(const Solver& solver, bool quadratic) {
   particles::ParticleSettings settings;
   settings.method = &method_named(solver.method);
   settings.dt = solver.dt;
+  settings.tolerance = solver.tolerance;
   settings.capacity = kCount;
   auto system = std::make_unique<particles::ParticleSystem<S>>(settings);
   if (quadratic)

@@ -125,11 +125,31 @@ TEST(Flight, FarFromTheOriginNothingChanges) {
   EXPECT_EQ(run(1024), here);
 }
 
+// Without a dt an adaptive method picks its own steps, to its tolerance.
+TEST(Flight, AnAdaptiveMethodKeepsItsTolerance) {
+  const auto error = [](double tolerance) {
+    ParticleSettings settings;
+    settings.method = &dormand_prince(), settings.tolerance = tolerance;
+    World world(1);
+    auto& system = world.add(std::make_unique<ParticleSystem<double>>(settings));
+    system.add_force(std::make_unique<QuadraticDrag<double>>(0.01));
+    system.add(thrown(Vec3::Zero(), Vec3(30, 30, 0)));
+    EXPECT_TRUE(world.update(3).good());
+    return (Vec3(system.positions().row(0).matrix().transpose()) - Vec3(60.7605452585, 24.9712406124, 0)).norm();
+  };
+  EXPECT_LT(error(1e-4), 1e-2);
+  EXPECT_LT(error(1e-10), 1e-8);
+  EXPECT_LT(error(1e-10), 0.01 * error(1e-4));
+}
+
 TEST(Flight, RefusesDragWhereTheMethodDoes) {
   ParticleSettings settings;
   settings.method = &pefrl();
   ParticleSystem<float> system(settings);
   EXPECT_THROW(system.add_force(std::make_unique<LinearDrag<float>>(1)), std::invalid_argument);
+  auto flow = std::make_unique<Vortex<float>>(Vec3::Zero(), Vec3(0, 1, 0), 1, 0.1);
+  EXPECT_THROW(system.add_force(std::make_unique<FlowDrag<float>>(std::move(flow), 2)), std::invalid_argument);
+  system.add_force(std::make_unique<Attractor<float>>(Vec3::Zero(), 1, 0.1));
 }
 
 }  // namespace

@@ -57,6 +57,8 @@ void check_settings(const ParticleSettings& s) {
   if (!s.origin.allFinite()) fail("origin must be finite");
   if (!s.method) fail("needs a method");
   if (!(s.dt >= 0) || !std::isfinite(s.dt)) fail("dt must not be negative, got " + std::to_string(s.dt) + " s");
+  if (!(s.tolerance > 0) || !std::isfinite(s.tolerance))
+    fail("tolerance must be positive, got " + std::to_string(s.tolerance) + " m");
   if (s.capacity < 1) fail("capacity must be 1 or more, got " + std::to_string(s.capacity));
   if (!(s.radius >= 0) || !std::isfinite(s.radius))
     fail("radius must not be negative, got " + std::to_string(s.radius) + " m");
@@ -224,7 +226,7 @@ ParticleSystem<S>::~ParticleSystem() = default;
 
 template <class S>
 void ParticleSystem<S>::add_force(std::unique_ptr<Force<S>> force) {
-  if (!settings_.method->accepts_velocity_forces && force->uses_velocity())
+  if (!settings_.method->accepts_velocity_forces && (force->uses_velocity() || force->uniform(0, 1).rate > 0))
     throw std::invalid_argument("particles \"" + name() + "\": " + std::string(settings_.method->name) +
                                 " needs forces of position alone, got drag");
   forces_.push_back(std::move(force));
@@ -577,7 +579,13 @@ void ParticleSystem<S>::integrate(Tile<S>& tile, Index first, Plan& plan, Worker
         std::copy_n(w.x.col(k).data(), tile.count, w.x0[k]);
         std::copy_n(w.v.col(k).data(), tile.count, w.v0[k]);
       }
-    if (!w.integrator->step(dynamics, w.x, w.v, plan.ends[std::size_t(s)], plan.h).converged) w.finite = false;
+    const double t = plan.ends[std::size_t(s)];
+    if (settings_.dt == 0 && settings_.method->adaptive() && !plan.solids.any()) {
+      if (!w.integrator->adapt(dynamics, w.x, w.v, t, plan.h, settings_.tolerance, 1e-6 * plan.h).converged)
+        w.finite = false;
+      continue;
+    }
+    if (!w.integrator->step(dynamics, w.x, w.v, t, plan.h).converged) w.finite = false;
     if (plan.exact && plan.solids.any()) {
       Tile<S> view = contact.view(w.x, w.v);
       std::fill_n(w.marks.data(), tile.count, S(0));

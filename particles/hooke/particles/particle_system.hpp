@@ -24,7 +24,8 @@ struct ParticleSettings {
   /// Any method of the core. `verlet` and `velocity-verlet` (which are one method here: velocities are those of the
   /// ticks), `semi-implicit-euler` and other splittings run in the fast loop, the rest through hooke::Integrator.
   const Method* method = &verlet();
-  double dt = 0;  ///< wanted substep [s]; 0: one a tick
+  double dt = 0;            ///< wanted substep [s]; 0: one a tick
+  double tolerance = 1e-6;  ///< adaptive methods with dt = 0, away from colliders: as Integrator::adapt [m], > 0
 
   Index capacity = 100'000;  ///< most particles alive
   enum class AtCapacity { Refuse, OldestDies };

@@ -356,6 +356,8 @@ void Solids<S>::meet(const Pose& pose, const Body& body, const Vec3& p, const Ve
           if (relative.dot(normal) >= -kNone * relative.norm() && (pushed || gap > -1e-9)) return;
           when = 0;
         } else {
+          // A trilinear distance falls by at most √3 of the way.
+          if (std::is_same_v<std::decay_t<decltype(shape)>, LevelSet> && gap > 1.7321 * relative.norm()) return;
           when = enter(shape, start, relative, rule_.radius);
           if (!(when < first.when)) return;
           normal = normal_at(shape, start + when * relative);
