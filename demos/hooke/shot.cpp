@@ -222,7 +222,12 @@ render::Camera Shot::camera_at(std::size_t frame) const {
 }
 
 render::Look Shot::look() const {
-  if (any({scene::Look::Spark})) return render::workshop_for(camera_at(0));
+  if (any({scene::Look::Spark})) {
+    render::Look look = render::workshop_for(camera_at(0));
+    // Cloth and people are to be seen beside the sparks.
+    if (!scene_.bodies.empty()) look.key_intensity *= 2.5, look.rim_intensity *= 2.5, look.fill_intensity *= 2;
+    return look;
+  }
   render::Look look = render::look_for(camera_at(0));
   if (any({scene::Look::Drop, scene::Look::Water})) look.floor_color = kPoolFloor, look.rim_intensity = kPoolRim;
   return look;
