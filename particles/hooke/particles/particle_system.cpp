@@ -625,7 +625,6 @@ void ParticleSystem<S>::flight(Tile<S>& tile, Index first, Plan& plan, Worker& w
     if (stage.closing > 0) kick(tile, closing.kick, a, closing.share);
     if (stage.opening > 0) kick(tile, opening.kick, a, opening.share);
   };
-  Landing landing;
   for (int run = 0; run < plan.runs; ++run) {
     if (plan.exact)
       for (int k = 0; k < 3; ++k) {
