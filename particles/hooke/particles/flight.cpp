@@ -264,6 +264,7 @@ Landing fly_once(const Tile<S>& tile, const Flight<S>& flight) {
     Group<Lanes<S>> g{hn::LoadU(d, px + i), hn::LoadU(d, py + i), hn::LoadU(d, pz + i),
                       hn::LoadU(d, qx + i), hn::LoadU(d, qy + i), hn::LoadU(d, qz + i)};
     if ((std::size_t(i) * sizeof(S)) % 64 == 0) {
+      if (ages) __builtin_prefetch(life + i + kAhead, 1);
       __builtin_prefetch(px + i + kAhead, 1), __builtin_prefetch(py + i + kAhead, 1),
           __builtin_prefetch(pz + i + kAhead, 1);
       __builtin_prefetch(qx + i + kAhead, 1), __builtin_prefetch(qy + i + kAhead, 1),
