@@ -288,5 +288,115 @@ TEST(Contact, StartsInsideArePushedOutAtABoundedSpeed) {
   EXPECT_LT(system.velocities().row(0).matrix().norm(), 1e-9);
 }
 
+// A world with one collider and one particle.
+template <class S>
+struct Alone {
+  World world{240};
+  ParticleSystem<S>* system;
+  Alone(Collider collider, ParticleSettings settings, const Vec3& x, const Vec3& v) {
+    world.add_collider(std::move(collider));
+    system = &world.add(std::make_unique<ParticleSystem<S>>(settings));
+    system->add(thrown(x, v));
+  }
+  Vec3 x() const { return system->positions().row(0).matrix().transpose(); }
+  Vec3 v() const { return system->velocities().row(0).matrix().transpose(); }
+  void run(double seconds) { ASSERT_TRUE(world.update(seconds).good()); }
+};
+
+Collider solid(Shape shape, double restitution = 0, double friction = 0) {
+  Collider out;
+  out.shapes = {std::move(shape)};
+  out.restitution = restitution, out.friction = friction;
+  return out;
+}
+
+TEST(ExactBounce, RestsOnBoxesBallsAndSlopesWithoutSinkingOrCreeping) {
+  ParticleSettings settings;
+  settings.exact_impacts = true;
+  for (const Shape& shape :
+       {Shape(Box{Vec3(0, -0.5, 0), Vec3(1, 0.5, 1), Mat3::Identity()}), Shape(Sphere{Vec3(0, -0.5, 0), 0.5})}) {
+    Alone<double> ball(solid(shape, 0.8), settings, Vec3(0, 0.1, 0), Vec3::Zero());
+    ball.run(8);
+    EXPECT_NEAR(ball.x().y(), 0, 1e-9);
+    EXPECT_NEAR(ball.v().norm(), 0, 1e-9);
+  }
+  Alone<double> slope(solid(HalfSpace{Vec3(0.5, std::sqrt(0.75), 0), 0}, 0, 1), settings, Vec3::Zero(), Vec3::Zero());
+  slope.run(2);
+  EXPECT_LT(slope.x().norm(), 1e-9);
+}
+
+TEST(ExactBounce, TellsImpactsThatDoNotBounceAndMeetsCallbacks) {
+  ParticleSettings settings;
+  settings.exact_impacts = true, settings.dies_on_impact = true;
+  Alone<double> dropped(solid(HalfSpace{}), settings, Vec3(0, 1, 0), Vec3::Zero());
+  dropped.run(1);
+  EXPECT_EQ(dropped.system->size(), 0);
+  settings.dies_on_impact = false;
+  Collider engine;
+  engine.distance = [](double, const Points<double>& x, Values<double>& distance, Points<double>& normal) {
+    distance = x.col(1);
+    normal.setZero();
+    normal.col(1).setOnes();
+  };
+  Alone<double> caught(engine, settings, Vec3(0, 1, 0), Vec3::Zero());
+  caught.run(1);
+  EXPECT_NEAR(caught.x().y(), 0, 0.01);
+}
+
+TEST(Contact, FastOnesDoNotPassSmallLevelSets) {
+  std::vector<float> values;
+  for (int k = 0; k < 13; ++k)
+    for (int j = 0; j < 13; ++j)
+      for (int i = 0; i < 13; ++i) values.push_back(float((0.025 * Vec3(i - 6, j - 6, k - 6)).norm() - 0.1));
+  const auto grid =
+      std::make_shared<DistanceGrid>(Vec3::Constant(-0.15), 0.025, std::array<int, 3>{13, 13, 13}, values);
+  for (int i = 0; i < 40; ++i) {
+    ParticleSettings settings;
+    Alone<float> shot(solid(LevelSet{grid, Vec3::Zero()}, 1), settings, Vec3(-3 + 0.01 * i, 0, 0), Vec3(90, 0, 0));
+    shot.world.set_gravity(Vec3::Zero());
+    shot.run(0.1);
+    EXPECT_LT(shot.x().x(), 0) << i;
+  }
+}
+
+TEST(Contact, ATurningCapsuleHitsWithTheSpeedOfItsEnd) {
+  Collider bat = solid(Capsule{Vec3(0, 0, 0), Vec3(1, 0, 0), 0.02}, 1);
+  bat.motion = [](double t, std::span<Shape> shapes) {
+    shapes[0] = Capsule{Vec3::Zero(), Vec3(std::cos(10 * t), std::sin(10 * t), 0), 0.02};
+  };
+  ParticleSettings settings;
+  Alone<double> ball(bat, settings, Vec3(0.95 * std::cos(0.5), 0.95 * std::sin(0.5), 0), Vec3::Zero());
+  ball.world.set_gravity(Vec3::Zero());
+  ball.run(0.2);
+  EXPECT_NEAR(ball.v().norm(), 2 * 9.5, 0.5);
+}
+
+TEST(Contact, EverySplittingRestsAndSoDoTopsOfBoxes) {
+  for (const Method* method : {&verlet(), &semi_implicit_euler(), &pefrl(), &blanes_moan_4()}) {
+    ParticleSettings settings;
+    settings.method = method;
+    Alone<float> ball(floor_at(0, 0.5), settings, Vec3(0, 0.3, 0), Vec3::Zero());
+    ball.run(3);
+    EXPECT_EQ(ball.v().norm(), 0) << method->name;
+  }
+  for (const double half : {0.1, 0.25, 0.3, 0.7}) {
+    Alone<float> ball(solid(Box{Vec3::Zero(), Vec3::Constant(half), Mat3::Identity()}, 0.3), {}, Vec3(0, 1, 0),
+                      Vec3::Zero());
+    ball.run(3);
+    EXPECT_LT(ball.v().norm(), 1e-6) << half;
+  }
+}
+
+TEST(Contact, AFloorThatIsAlmostLevelIsNotTakenForOne) {
+  ParticleSettings settings;
+  World world;
+  const Vec3 normal = Vec3(-2e-4, 1, 0).normalized();
+  world.add_collider(solid(HalfSpace{normal, 0}, 0, 1));
+  auto& system = world.add(std::make_unique<ParticleSystem<float>>(settings));
+  for (int i = 0; i < 64; ++i) system.add(thrown(Vec3(50, 0.2, 0), Vec3::Zero()));
+  ASSERT_TRUE(world.update(2).good());
+  for (Index i = 0; i < 64; ++i) EXPECT_NEAR(system.positions().row(i).matrix().dot(normal), 0, 1e-4);
+}
+
 }  // namespace
 }  // namespace hooke::particles

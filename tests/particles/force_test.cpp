@@ -137,5 +137,48 @@ TEST(Masses, HeavyOnesFallFasterThroughAir) {
   EXPECT_NEAR(system.velocities()(1, 1), -9.81 * 0.2, 1e-6);
 }
 
+TEST(Attractor, NegativeKicksCount) {
+  for (const Method* method : {&pefrl(), &blanes_moan_4(), &blanes_moan_6()}) {
+    ParticleSettings settings;
+    settings.method = method;
+    World world;
+    auto& system = world.add(std::make_unique<ParticleSystem<double>>(settings));
+    system.add_force(std::make_unique<Attractor<double>>(Vec3::Zero(), 1e-12, 1));
+    system.add(thrown(Vec3::Zero(), Vec3::Zero()));
+    ASSERT_TRUE(world.update(1).good());
+    EXPECT_NEAR(system.velocities()(0, 1), -9.81, 1e-9) << method->name;
+    EXPECT_NEAR(system.positions()(0, 1), -4.905, 1e-9) << method->name;
+  }
+}
+
+// Two neighbours on the border of cells, where rounding decides which one they are in.
+TEST(Repulsion, IsMutualAtTheBordersOfCells) {
+  for (const float x : {0.7f, 0.8f, 0.3f, -0.1f, -0.7f}) {
+    ParticleSettings settings;
+    World world;
+    world.set_gravity(Vec3::Zero());
+    auto& system = world.add(std::make_unique<ParticleSystem<float>>(settings));
+    system.add_force(std::make_unique<Repulsion<float>>(100, 0.1));
+    system.add(thrown(Vec3(x, 0, 0), Vec3::Zero())), system.add(thrown(Vec3(double(x) + 0.05, 0, 0), Vec3::Zero()));
+    ASSERT_TRUE(world.update(1.0 / 240).good());
+    EXPECT_LT(system.velocities()(0, 0), 0) << x;
+    EXPECT_NEAR(system.velocities()(0, 0), -system.velocities()(1, 0), 1e-6) << x;
+  }
+}
+
+TEST(CurlNoise, DoesNotJumpWhereItsPatternWraps) {
+  const CurlNoise<double> noise({1.0, 0.5, 1.0, 7});
+  Cloud<double> cloud(2);
+  const auto at = [&](double t) {
+    cloud.clear();
+    noise.add_velocity(cloud.tile, Vec3::Zero(), t, cloud.a);
+    return std::vector<double>(cloud.a[0], cloud.a[0] + cloud.n);
+  };
+  for (const double t : {0.0, 1024 / 0.31, 1024 / 0.87}) {
+    const auto before = at(t - 1e-7), after = at(t + 1e-7);
+    for (std::size_t i = 0; i < before.size(); ++i) ASSERT_NEAR(before[i], after[i], 1e-4) << t;
+  }
+}
+
 }  // namespace
 }  // namespace hooke::particles

@@ -303,7 +303,8 @@ Landing fly_once(const Tile<S>& tile, const Flight<S>& flight) {
 template <class S>
 Landing fly_any(const Tile<S>& tile, const Flight<S>& flight) {
   const bool once = flight.legs.size() == 1 && flight.last,
-             floor = flight.plane_count == 1 && flight.planes->normal[1] == 1;
+             floor = flight.plane_count == 1 && flight.planes->normal[1] == 1 && flight.planes->normal[0] == 0 &&
+                     flight.planes->normal[2] == 0;
   if (once && flight.plane_count == 0) return fly_once<Planes::None>(tile, flight);
   if (once && floor) return fly_once<Planes::Floor>(tile, flight);
   if (flight.plane_count == 0) return fly_lanes<Planes::None>(tile, flight);

@@ -70,10 +70,14 @@ HOOKE_CLONES void attract(Index n, const double* const x[3], const double place[
   attract_loop(n, x, place, s, r, a);
 }
 
+// The lattice repeats after so many cells: what drifts can be wrapped, and float keeps its digits.
+constexpr std::uint32_t kLattice = 1024;
+
 // A pseudo-random vector of a lattice point, components in [-1, 1].
 template <class S>
 HOOKE_INLINE void lattice_vector(std::uint32_t i, std::uint32_t j, std::uint32_t k, std::uint32_t seed, S& gx, S& gy,
                                  S& gz) {
+  i &= kLattice - 1, j &= kLattice - 1, k &= kLattice - 1;
   std::uint32_t h = i * 0x8da6b343u + j * 0xd8163841u + k * 0xcb1ab31fu + seed;
   h = (h ^ (h >> 16)) * 0x7feb352du;
   h = (h ^ (h >> 15)) * 0x846ca68bu;
@@ -120,8 +124,9 @@ HOOKE_INLINE void curl_loop(Index n, const S* const x[3], const S shift[3], S sc
   HOOKE_INDEPENDENT
   for (Index i = 0; i < n; ++i) {
     const S a = px[i] * scale + sx, b = py[i] * scale + sy, c = pz[i] * scale + sz;
-    // Rounding down without a call: lattices begin above zero.
-    const std::int32_t cx = std::int32_t(a), cy = std::int32_t(b), cz = std::int32_t(c);
+    // Rounding down without a call.
+    std::int32_t cx = std::int32_t(a), cy = std::int32_t(b), cz = std::int32_t(c);
+    cx -= a < S(cx) ? 1 : 0, cy -= b < S(cy) ? 1 : 0, cz -= c < S(cz) ? 1 : 0;
     InCell<S> at;
     at.i = std::uint32_t(cx), at.j = std::uint32_t(cy), at.k = std::uint32_t(cz);
     at.u = a - S(cx), at.v = b - S(cy), at.w = c - S(cz);
@@ -178,9 +183,6 @@ template <class S>
 std::array<S, 3> three(const Vec3& v) {
   return {S(v.x()), S(v.y()), S(v.z())};
 }
-
-// Cells in a stretch of the lattice: places lie between one and two of them, plus what a system reaches.
-constexpr double kLattice = 1024;
 
 // RMS of one component of the curl above is about this, by sampling.
 constexpr double kCurlRms = 0.712;
@@ -262,6 +264,9 @@ void FlowDrag<S>::add_acceleration(const Tile<S>& tile, Index, const Vec3& origi
     Tile<S> part = tile;
     part.count = n;
     for (int k = 0; k < 3; ++k) part.x[k] += first, part.v[k] += first, std::fill_n(u[k], n, S(0));
+    if (part.serial) part.serial += first;
+    if (part.inverse_mass) part.inverse_mass += first;
+    if (part.remaining) part.remaining += first;
     S* const out[3] = {u[0], u[1], u[2]};
     flow_->add_velocity(part, origin, t, out);
     for (int k = 0; k < 3; ++k)
@@ -286,7 +291,7 @@ void CurlNoise<S>::add_velocity(const Tile<S>& tile, const Vec3& origin, double 
     for (int k = 0; k < 3; ++k) {
       // Whole stretches of the lattice are left out, so that float keeps its digits after hours and far away.
       const double place = (origin[k] / size) - kWays[octave][k] * t / settings_.turnover * (1 + octave);
-      shift[std::size_t(k)] = S(kLattice + place - kLattice * std::floor(place / kLattice));
+      shift[std::size_t(k)] = S(place - kLattice * std::floor(place / kLattice));
     }
     curl(tile.count, tile.x, shift.data(), S(1 / size), S(speed), settings_.seed + std::uint32_t(octave) * 77773u, u);
     size /= 2;
@@ -335,10 +340,13 @@ Repulsion<S>::Repulsion(double stiffness, double distance) : stiffness_(stiffnes
   check(distance > 0 && std::isfinite(distance), "Repulsion: distance", "positive", distance);
 }
 
+// The cell that is `step` cells from a place.
 template <class S>
-std::uint32_t Repulsion<S>::cell_of(S x, S y, S z) const {
-  const auto at = [&](S v) { return std::uint32_t(std::int64_t(std::floor(double(v) / distance_))); };
-  return (at(x) * 0x8da6b343u ^ at(y) * 0xd8163841u ^ at(z) * 0xcb1ab31fu) & mask_;
+std::uint32_t Repulsion<S>::cell_of(const S place[3], const int step[3]) const {
+  const auto at = [&](int k) {
+    return std::uint32_t(std::int64_t(std::floor(double(place[k]) / distance_)) + step[k]);
+  };
+  return (at(0) * 0x8da6b343u ^ at(1) * 0xd8163841u ^ at(2) * 0xcb1ab31fu) & mask_;
 }
 
 template <class S>
@@ -352,7 +360,9 @@ void Repulsion<S>::prepare(const Tile<S>& all, double) {
   sorted_.resize(std::size_t(n));
   start_.assign(std::size_t(cells) + 1, 0);
   for (Index i = 0; i < n; ++i) {
-    cell_[std::size_t(i)] = cell_of(all.x[0][i], all.x[1][i], all.x[2][i]);
+    const S place[3] = {all.x[0][i], all.x[1][i], all.x[2][i]};
+    const int here[3] = {0, 0, 0};
+    cell_[std::size_t(i)] = cell_of(place, here);
     ++start_[cell_[std::size_t(i)] + 1];
   }
   for (std::size_t c = 1; c < start_.size(); ++c) start_[c] += start_[c - 1];
@@ -369,8 +379,9 @@ void Repulsion<S>::prepare(const Tile<S>& all, double) {
     std::uint32_t seen[27];
     int cells_seen = 0;
     for (int c = 0; c < 27; ++c) {
-      const S d = S(distance_);
-      const std::uint32_t cell = cell_of(x + S(c % 3 - 1) * d, y + S(c / 3 % 3 - 1) * d, z + S(c / 9 - 1) * d);
+      const S place[3] = {x, y, z};
+      const int step[3] = {c % 3 - 1, c / 3 % 3 - 1, c / 9 - 1};
+      const std::uint32_t cell = cell_of(place, step);
       // Two neighbours may share a bucket of the hash.
       if (std::find(seen, seen + cells_seen, cell) != seen + cells_seen) continue;
       seen[cells_seen++] = cell;

@@ -39,7 +39,8 @@ class Force {
   virtual void add_acceleration(const Tile<S>& tile, Index first, const Vec3& origin, double t, S* const a[3]) const;
 };
 
-/// F = -c (v - wind), c in N·s/m.
+/// F = -c (v - wind), c in N·s/m. Exact at any step where all particles weigh the same; where masses differ it is
+/// evaluated like any other force and needs steps below 2 m / c.
 template <class S>
 class LinearDrag final : public Force<S> {
  public:
@@ -166,7 +167,7 @@ class Repulsion final : public Force<S> {
   void add_acceleration(const Tile<S>& tile, Index first, const Vec3& origin, double t, S* const a[3]) const override;
 
  private:
-  std::uint32_t cell_of(S x, S y, S z) const;
+  std::uint32_t cell_of(const S place[3], const int step[3]) const;
   double stiffness_, distance_;
   std::uint32_t mask_ = 0;
   std::vector<std::uint32_t> cell_, start_;  // by particle; by cell, where its particles begin in sorted_

@@ -155,6 +155,7 @@ class TileDynamics final : public Dynamics<S> {
     }
   }
   bool uses_velocity_now = false;
+  double time = 0;  // of the step's end [s]
   bool uses_velocity() const override { return uses_velocity_now; }
   void acceleration(const Points<S>& x, const Points<S>& v, double t, Points<S>& a) override {
     accelerate_(x, v, t, a);
@@ -176,9 +177,9 @@ class TileDynamics final : public Dynamics<S> {
     const S scale = std::max(v.abs().maxCoeff(), S(1e-3));
     const S step = (sizeof(S) == 4 ? S(3e-3) : S(1e-6)) * scale / size;
     x_ = x + (step * h) * d, v_ = v + step * d;
-    accelerate_(x_, v_, 0, ahead_);
+    accelerate_(x_, v_, time, ahead_);
     x_ = x - (step * h) * d, v_ = v - step * d;
-    accelerate_(x_, v_, 0, behind_);
+    accelerate_(x_, v_, time, behind_);
     out -= (h / (2 * step)) * ((ahead_ - behind_).colwise() * mass_);
   }
 
@@ -194,8 +195,7 @@ class TileDynamics final : public Dynamics<S> {
 // ---- Set-up
 
 template <class S>
-ParticleSystem<S>::ParticleSystem(ParticleSettings settings)
-    : Body(settings.name), settings_(std::move(settings)), random_(settings_.seed) {
+ParticleSystem<S>::ParticleSystem(ParticleSettings settings) : Body(settings.name), settings_(std::move(settings)) {
   check_settings(settings_);
   const Index n = settings_.capacity;
   // Columns that do not share their place in the caches' sets.
@@ -235,9 +235,10 @@ void ParticleSystem<S>::add_force(std::unique_ptr<Force<S>> force) {
 template <class S>
 void ParticleSystem<S>::add_emitter(EmitterSettings emitter) {
   emitter.start -= settings_.prewarm;
+  emitter.seed = Random(settings_.seed).bits(emitter.seed, emitters_.size());
   Emitter made(std::move(emitter));
   const EmitterSettings& e = made.settings();
-  if (!has_mass_ && inverse_mass_.size() == 0 && emitters_.empty()) same_mass_ = e.mass.least;
+  if (!has_mass_ && inverse_mass_.size() == 0 && emitters_.empty() && count_ == 0) same_mass_ = e.mass.least;
   if (e.mass.least != same_mass_ || e.mass.most != same_mass_) has_mass_ = true;
   if (has_mass_ && inverse_mass_.size() == 0) inverse_mass_.setConstant(padded_, S(1 / same_mass_));
   if (std::isfinite(e.lifetime.least) && remaining_.size() == 0) {
@@ -281,7 +282,7 @@ void ParticleSystem<S>::add_sub_emitter(SubEmitterSettings sub) {
     has_mass_ = true;
     if (inverse_mass_.size() == 0) inverse_mass_.setConstant(padded_, S(1 / same_mass_));
   }
-  sub_random_.emplace_back(sub.seed + 0x5151 + sub_emitters_.size());
+  sub_random_.emplace_back(Random(settings_.seed).bits(sub.seed, ~std::uint64_t(sub_emitters_.size())));
   sub_emitters_.push_back(sub);
 }
 
@@ -298,6 +299,8 @@ template <class S>
 typename ParticleSystem<S>::Particle ParticleSystem<S>::get(Index i) const {
   const std::size_t at = std::size_t(i);
   Particle p;
+  p.inverse_mass = S(1 / same_mass_);
+  p.remaining = p.previous_remaining = std::numeric_limits<S>::max();
   p.position = row(position_, i), p.velocity = row(velocity_, i);
   if (settings_.keeps_previous) {
     p.previous_position = row(previous_position_, i), p.previous_velocity = row(previous_velocity_, i);
@@ -373,6 +376,11 @@ bool ParticleSystem<S>::append(const Birth& birth, double time_now, const Tick* 
 template <class S>
 void ParticleSystem<S>::remove(Index i) {
   removed_.push_back({i, get(i)});
+  remove_now(i);
+}
+
+template <class S>
+void ParticleSystem<S>::remove_now(Index i) {
   const std::uint32_t slot = slot_[std::size_t(i)];
   slots_[slot].index = -1;
   ++slots_[slot].generation;
@@ -476,7 +484,7 @@ void ParticleSystem<S>::plan(const Tick& tick) {
   }
   const std::span<const Collider> colliders = settings_.collides ? tick.colliders : std::span<const Collider>{};
   p.solids.place(colliders, settings_.origin, p.uniform.acceleration,
-                 {settings_.radius, settings_.restitution, settings_.rest_speed}, p.ends);
+                 {settings_.radius, settings_.restitution, settings_.rest_speed, p.h}, p.ends);
   if (table) {
     const bool alone = !p.varies && !p.solids.bodies() && !p.solids.callbacks() && !p.exact;
     p.way = alone ? Plan::Way::Fused : Plan::Way::Staged;
@@ -580,6 +588,7 @@ void ParticleSystem<S>::integrate(Tile<S>& tile, Index first, Plan& plan, Worker
         std::copy_n(w.v.col(k).data(), tile.count, w.v0[k]);
       }
     const double t = plan.ends[std::size_t(s)];
+    dynamics.time = t + plan.h;
     if (settings_.dt == 0 && settings_.method->adaptive() && !plan.solids.any()) {
       if (!w.integrator->adapt(dynamics, w.x, w.v, t, plan.h, settings_.tolerance, 1e-6 * plan.h).converged)
         w.finite = false;
@@ -590,6 +599,7 @@ void ParticleSystem<S>::integrate(Tile<S>& tile, Index first, Plan& plan, Worker
       Tile<S> view = contact.view(w.x, w.v);
       std::fill_n(w.marks.data(), tile.count, S(0));
       plan.solids.resolve_exactly(view, s, plan.h, w.x0, w.v0, w.marks.data(), plan.hits ? &w.hits : nullptr);
+      if (plan.solids.callbacks()) plan.solids.call_back(view, s, plan.hits ? &w.hits : nullptr);
       w.integrator->restart();
     }
   }
@@ -610,7 +620,7 @@ void ParticleSystem<S>::flight(Tile<S>& tile, Index first, Plan& plan, Worker& w
     const typename Plan::Stage& stage = plan.stages[stage_number];
     const auto closing = push_of<S>(plan.uniform, stage.closing), opening = push_of<S>(plan.uniform, stage.opening);
     const S* const a[3] = {w.a[0], w.a[1], w.a[2]};
-    if (plan.velocity && stage.closing > 0) {
+    if (plan.velocity && stage.closing != 0) {
       // At the velocity that the last accelerations predict for the step's end.
       Tile<S> ahead = tile;
       for (int k = 0; k < 3; ++k) {
@@ -622,8 +632,8 @@ void ParticleSystem<S>::flight(Tile<S>& tile, Index first, Plan& plan, Worker& w
     } else {
       accelerate(tile, first, stage.time, w.a);
     }
-    if (stage.closing > 0) kick(tile, closing.kick, a, closing.share);
-    if (stage.opening > 0) kick(tile, opening.kick, a, opening.share);
+    if (stage.closing != 0) kick(tile, closing.kick, a, closing.share);
+    if (stage.opening != 0) kick(tile, opening.kick, a, opening.share);
   };
   for (int run = 0; run < plan.runs; ++run) {
     if (plan.exact)
@@ -675,6 +685,7 @@ void ParticleSystem<S>::flight(Tile<S>& tile, Index first, Plan& plan, Worker& w
     if (plan.exact && solids.any()) {
       std::fill_n(w.marks.data(), tile.count, S(0));
       solids.resolve_exactly(tile, run, plan.h, w.x0, w.v0, w.marks.data(), hits);
+      if (solids.callbacks()) solids.call_back(tile, run, hits);
     } else if (solids.bodies() && last_run) {
       if (solids.mark(tile, step, S(0), nullptr, w.marks.data())) solids.settle(tile, step, w.marks.data());
     }
@@ -744,6 +755,12 @@ void ParticleSystem<S>::fly_newborn(Index i, double t0, const Tick& tick) {
   // Forces that look at neighbours were prepared before it was born; -1 marks that it has no place among them.
   move(tile, -1, *plan_, w);
   for (int k = 0; k < 3; ++k) position_(i, k) = x[k][0], velocity_(i, k) = v[k][0];
+  // What it met counts in the next tick, when it has its place.
+  for (Event& event : w.events) {
+    event.particle = i;
+    event.kind = kind_[std::size_t(i)];
+    early_.push_back(event);
+  }
 }
 
 template <class S>
@@ -751,7 +768,9 @@ void ParticleSystem<S>::simulate_tick(const Tick& tick) {
   removed_.clear();
   previous_counts_ = counts_;
   previous_serial_ = next_serial_;
-  events_.clear();
+  events_.assign(early_.begin(), early_.end());
+  for (Event& event : events_) event.order -= 1'000'000;  // before those of this tick
+  early_.clear();
   const Tile<S> all = tile_at(0, count_);
   for (const auto& force : forces_) force->prepare(all, tick.start);
   plan(tick);
@@ -764,6 +783,7 @@ void ParticleSystem<S>::simulate_tick(const Tick& tick) {
   const Index spans = (count_ + span - 1) / span, at_once = fused ? 1 : kTilesAtOnce;
   const int threads = tick.gang && spans > 2 * at_once ? tick.gang->size() : 1;
   while (int(workers_.size()) < threads) workers_.push_back(std::make_unique<Worker>(settings_.tile));
+  for (const auto& worker : workers_) worker->finite = true;
   std::atomic<Index> next{0};
   const auto work = [&](int number) {
     Worker& w = *workers_[std::size_t(number)];
@@ -837,9 +857,16 @@ void ParticleSystem<S>::births(double t0, double t1, const Tick* tick) {
   if (!sub_emitters_.empty()) sub_births();
   const std::size_t children = born_.size();
   for (const Emitter& emitter : emitters_) emitter.births(t0, t1, born_);
-  const Index wanted = Index(born_.size());
+  Index wanted = Index(born_.size());
+  std::size_t skipped = 0;
   if (settings_.at_capacity == ParticleSettings::AtCapacity::OldestDies && count_ + wanted > settings_.capacity &&
       count_ > 0) {
+    // More than there is room for at all: the earliest of them had to go already.
+    if (wanted > settings_.capacity) {
+      skipped = std::size_t(wanted - settings_.capacity);
+      counts_.refused += std::int64_t(skipped);
+      wanted = settings_.capacity;
+    }
     const Index surplus = std::min(count_, count_ + wanted - settings_.capacity);
     oldest_.clear();
     for (Index i = 0; i < count_; ++i) oldest_.emplace_back(serial_[std::size_t(i)], i);
@@ -851,7 +878,7 @@ void ParticleSystem<S>::births(double t0, double t1, const Tick* tick) {
   }
   births_begin_ = count_;
   events_.clear();
-  for (std::size_t i = 0; i < born_.size(); ++i) {
+  for (std::size_t i = skipped; i < born_.size(); ++i) {
     if (!append(born_[i], t1, tick) || !wants_births_ || i < children) continue;
     const Birth& birth = born_[i];
     Event event{SubEmitterSettings::On::Birth,
@@ -871,6 +898,23 @@ void ParticleSystem<S>::births(double t0, double t1, const Tick* tick) {
     sub_births();
     for (const Birth& birth : born_) append(birth, t1, tick);
   }
+  // Lives that are shorter than what was left of the tick.
+  if (remaining_.size() > 0)
+    for (Index i = count_; i-- > births_begin_;)
+      if (remaining_[i] <= 0) {
+        drop_newborn(i);
+        ++counts_.died;
+      }
+}
+
+// Taken back before anybody saw it; what fills its place is a newborn too.
+template <class S>
+void ParticleSystem<S>::drop_newborn(Index i) {
+  std::erase_if(early_, [&](const Event& event) { return event.particle == i; });
+  const Index last = count_ - 1;
+  for (Event& event : early_)
+    if (event.particle == last) event.particle = i;
+  remove_now(i);
 }
 
 template <class S>
@@ -889,9 +933,13 @@ template <class S>
 StepReport ParticleSystem<S>::advance(const Tick& tick) {
   if (!started_) {
     started_ = true;
-    if (settings_.prewarm > 0) prewarm(tick);
+    if (settings_.prewarm > 0) {
+      warming_ = true;
+      prewarm(tick);
+      warming_ = false;
+    }
   }
-  spend_bank(tick.end - tick.start);
+  if (!warming_) spend_bank(tick.end - tick.start);
   simulate_tick(tick);
   for (const auto& worker : workers_) {
     if (worker->finite) continue;
@@ -910,6 +958,11 @@ StepReport ParticleSystem<S>::advance(const Tick& tick) {
     return report;
   }
   // Deaths, then births: the events of both are known before anything changes its place.
+  if (settings_.dies_on_impact) {
+    for (const Event& event : events_) dead_.push_back(event.particle);
+    std::sort(dead_.begin(), dead_.end());
+    dead_.erase(std::unique(dead_.begin(), dead_.end()), dead_.end());
+  }
   if (wants_deaths_)
     for (const Index i : dead_) {
       Event event{SubEmitterSettings::On::Death,
@@ -924,9 +977,6 @@ StepReport ParticleSystem<S>::advance(const Tick& tick) {
                   0};
       events_.push_back(event);
     }
-  if (settings_.dies_on_impact)
-    for (const Event& event : events_)
-      if (event.on == SubEmitterSettings::On::Impact) dead_.push_back(event.particle);
   remove_all(dead_);
   counts_.died += std::int64_t(dead_.size());
   births(tick.start, tick.end, &tick);
@@ -952,7 +1002,6 @@ void ParticleSystem<S>::take_back() {
   while (count_ > births_begin_) {
     const std::uint32_t slot = slot_[std::size_t(--count_)];
     slots_[slot].index = -1;
-    ++slots_[slot].generation;
     free_.push_back(slot);
   }
   for (std::size_t r = removed_.size(); r-- > 0;) {
@@ -965,6 +1014,7 @@ void ParticleSystem<S>::take_back() {
   }
   removed_.clear();
   births_begin_ = count_;
+  early_.clear();
   position_.topRows(count_) = previous_position_.topRows(count_);
   velocity_.topRows(count_) = previous_velocity_.topRows(count_);
   if (remaining_.size() > 0) remaining_.head(count_) = previous_remaining_.head(count_);
@@ -981,23 +1031,32 @@ void ParticleSystem<S>::add_force(Index point, const Vec3& force) {
 }
 
 template <class S>
-void ParticleSystem<S>::begin_frame(double seconds, double, double, double) {
-  if (!pushed_.empty()) bank_.push_back({seconds, pushed_});
+void ParticleSystem<S>::begin_frame(double seconds, double waiting, double, double) {
+  // What waits of earlier frames comes first and has no forces of its own; then every frame has its place.
+  if (pushed_.empty() && bank_.empty()) return;
+  if (bank_.empty() && waiting > 0) bank_.push_back({waiting, {}});
+  bank_.push_back({seconds, pushed_});
 }
 
-// The impulse of this tick's share; in the order of arrival.
+// The impulses of this tick's share, in the order of arrival.
 template <class S>
 void ParticleSystem<S>::spend_bank(double seconds) {
-  for (Banked& piece : bank_) {
-    const double spent = std::min(piece.seconds, seconds);
+  double left = seconds;
+  while (!bank_.empty() && left > 1e-9 * seconds) {
+    Banked& piece = bank_.front();
+    // A piece that ends with the tick but for rounding does.
+    const bool all = piece.seconds <= left + 1e-9 * seconds;
+    const double spent = all ? std::min(piece.seconds, left) : left;
     for (const Push& push : piece.pushes)
       if (const Index i = find(push.who); i >= 0)
         set_row(velocity_, i,
                 row(velocity_, i) + spent * (has_mass_ ? double(inverse_mass_[i]) : 1 / same_mass_) * push.force);
-    piece.seconds -= spent;
-    break;
+    left -= spent;
+    if (all)
+      bank_.erase(bank_.begin());
+    else
+      piece.seconds -= spent;
   }
-  if (!bank_.empty() && bank_.front().seconds <= 1e-9 * seconds) bank_.erase(bank_.begin());
 }
 
 // ---- What can be asked

@@ -42,8 +42,8 @@ struct ParticleSettings {
   double prewarm = 0;          ///< [s] that are simulated before the first tick
   bool keeps_previous = true;  ///< needed for positions_between and to take a tick back; costs a copy
   Index trail = 0;             ///< positions of so many ticks are kept for each particle
-  Index tile = 512;            ///< particles that pass through all modules together; changes no bit
-  std::uint64_t seed = 0;
+  Index tile = 512;            ///< particles that pass through all modules together; changes no bit of explicit methods
+  std::uint64_t seed = 0;      ///< of everything random; emitters differ by their order and own seeds
   std::vector<Kind> kinds;
 };
 
@@ -60,7 +60,8 @@ struct Counts {
   std::int64_t impacts = 0;    ///< told only where sub-emitters or dies_on_impact ask for them
 };
 
-/// Particles as a body of the world. The same bits at any thread count and tile size.
+/// Particles as a body of the world. The same bits at any thread count, and at any tile size where the method is
+/// explicit with steps of its own (implicit solves and error control look at a whole tile).
 ///
 /// Order within a tick: births of sub-emitters' parents, forces and flight, contacts, ageing, deaths, births; who is
 /// born within a tick flies on for the rest of it. Dead particles are replaced by the last ones, so indices change from
@@ -145,6 +146,8 @@ class ParticleSystem final : public Body {
   void put(Index i, const Particle& particle);
   bool append(const Birth& birth, double time_now, const Tick* tick);
   void remove(Index i);
+  void remove_now(Index i);
+  void drop_newborn(Index i);
   void remove_all(std::vector<Index>& dead);
   Tile<S> tile_at(Index first, Index count);
   void plan(const Tick& tick);
@@ -165,7 +168,6 @@ class ParticleSystem final : public Body {
   std::vector<Emitter> emitters_;
   std::vector<SubEmitterSettings> sub_emitters_;
   std::vector<Random> sub_random_;
-  Random random_;
   bool wants_births_ = false, wants_deaths_ = false, wants_impacts_ = false;
 
   // By particle. Hot: read and written in every tick. Cold: only at births, deaths and when asked.
@@ -207,10 +209,11 @@ class ParticleSystem final : public Body {
   std::vector<std::unique_ptr<Worker>> workers_;
   std::unique_ptr<Worker> newborn_;
   std::vector<Event> events_;
+  std::vector<Event> early_;  // impacts of newborns, for the next tick
   std::vector<Birth> born_;
   std::vector<Index> dead_;
   std::vector<std::pair<std::uint64_t, Index>> oldest_;
-  bool started_ = false;
+  bool started_ = false, warming_ = false;
   int steps_ = 1;
   std::int64_t evaluations_ = 0;
 

@@ -170,14 +170,19 @@ double gap_to(const Box& shape, const Vec3& p, double radius) {
 }
 double gap_to(const LevelSet& shape, const Vec3& p, double radius) {
   const Vec3 q = p - shape.offset;
-  if ((q.array() < shape.grid->lower().array() - radius).any() ||
-      (q.array() > shape.grid->upper().array() + radius).any())
-    return 1;
+  const double away = (q - q.cwiseMax(shape.grid->lower()).cwiseMin(shape.grid->upper())).norm();
+  // The solid is inside of its grid.
+  if (away > 0) return std::max(away - radius, std::numeric_limits<double>::min());
   return shape.grid->distance(q) - radius;
 }
 template <class Form>
 double gap_to(const Form& shape, const Vec3& p, double radius) {
   return signed_distance(shape, p) - radius;
+}
+
+// A component that is nothing but the rounding of its vector.
+double without_rounding(double component, const Vec3& of) {
+  return std::abs(component) <= 1e-14 * of.norm() ? 0 : component;
 }
 
 // Marks the particles whose way from x - drift v (or from) to x comes into the box: by how far it stays away from it.
@@ -235,17 +240,29 @@ Plane<S> plane_of(const HalfSpace& shape, double moved, double h, const Collider
   plane.offset = S(offset);
   plane.bounce = S(std::max(collider.restitution, rule.restitution));
   plane.friction = S(collider.friction);
-  const double slow = std::max(rule.rest_speed, 2 * h * std::abs(shape.normal.dot(gravity)));
+  const double slow = std::max(rule.rest_speed, 2 * rule.step * std::abs(shape.normal.dot(gravity)));
   plane.slow = S(slow);
-  plane.near = S(0.05 * slow * h + 8 * double(std::numeric_limits<S>::epsilon()) * std::max(1e-3, std::abs(offset)));
+  plane.near =
+      S(0.05 * slow * rule.step + 8 * double(std::numeric_limits<S>::epsilon()) * std::max(1e-3, std::abs(offset)));
   return plane;
 }
 
 }  // namespace
 
+// How far the solid's part next to a place moves within the leg.
 template <class S>
-double Solids<S>::slow(const Vec3& normal, double drift) const {
-  return std::max(rule_.rest_speed, 2 * drift * std::abs(normal.dot(gravity_)));
+Vec3 Solids<S>::Pose::move_at(const Vec3& place) const {
+  const auto* capsule = std::get_if<Capsule>(&shape);
+  if (!capsule || skew.squaredNorm() == 0) return move;
+  const Vec3 axis = capsule->b - capsule->a;
+  const double length2 = axis.squaredNorm();
+  const double along = length2 > 0 ? std::clamp((place - capsule->a).dot(axis) / length2, 0.0, 1.0) : 0.5;
+  return move + (along - 0.5) * skew;
+}
+
+template <class S>
+double Solids<S>::slow(const Vec3& normal) const {
+  return std::max(rule_.rest_speed, 2 * rule_.step * std::abs(normal.dot(gravity_)));
 }
 
 template <class S>
@@ -296,8 +313,16 @@ void Solids<S>::place(std::span<const Collider> colliders, const Vec3& origin, c
           pose.shape = moved(now_[s], -origin);
           pose.move = place_of(next_[s]) - place_of(now_[s]);
           bounds(pose.shape, rule.radius, pose.lower, pose.upper);
-          pose.lower += pose.move.cwiseMin(0.0);
-          pose.upper += pose.move.cwiseMax(0.0);
+          // Where it is at the leg's end counts as well; what turns in between is a little larger.
+          Vec3 lower, upper;
+          bounds(moved(next_[s], -origin), rule.radius, lower, upper);
+          pose.lower = pose.lower.cwiseMin(lower), pose.upper = pose.upper.cwiseMax(upper);
+          if (const auto* from = std::get_if<Capsule>(&now_[s])) {
+            const auto& to = std::get<Capsule>(next_[s]);
+            pose.skew = (to.b - from->b) - (to.a - from->a);
+          } else {
+            pose.skew.setZero();
+          }
         }
         ++solid;
       }
@@ -343,8 +368,9 @@ bool Solids<S>::mark_planes(const Tile<S>& tile, int leg, S* marks) const {
 template <class S>
 void Solids<S>::meet(const Pose& pose, const Body& body, const Vec3& p, const Vec3& way, double done, double left,
                      double drift, bool pushed, Meeting& first) const {
-  const Vec3 wall = drift > 0 ? Vec3(pose.move / drift) : Vec3(Vec3::Zero());
-  const Vec3 start = p - done * pose.move, relative = way - left * wall;
+  const Vec3 move = pose.move_at(p);
+  const Vec3 wall = drift != 0 ? Vec3(move / drift) : Vec3(Vec3::Zero());
+  const Vec3 start = p - done * move, relative = way - left * wall;
   std::visit(
       [&](const auto& shape) {
         const double gap = gap_to(shape, start, rule_.radius);
@@ -368,12 +394,12 @@ void Solids<S>::meet(const Pose& pose, const Body& body, const Vec3& p, const Ve
 }
 
 template <class S>
-Vec3 Solids<S>::answer(const Meeting& at, const Vec3& v, double drift, Index i, int leg, const Vec3& place,
+Vec3 Solids<S>::answer(const Meeting& at, const Vec3& v, Index i, int leg, const Vec3& place,
                        std::vector<Hit<S>>* hits) const {
   const Vec3 relative = v - at.wall;
   const double approach = -relative.dot(at.normal);
   if (approach <= 0) return v;
-  const double limit = slow(at.normal, drift);
+  const double limit = slow(at.normal);
   const double bounce = approach < limit ? 0 : at.bounce;
   const double impulse = (1 + bounce) * approach;
   const Vec3 slip = relative + approach * at.normal;
@@ -402,7 +428,7 @@ void Solids<S>::resolve(const Tile<S>& tile, int leg, S drift, const S* const* f
     bool touched = false, pushed = false;
     for (int contact = 0; contact < kMostContacts; ++contact) {
       Meeting first;
-      const double done = h > 0 ? 1 - left / h : 1;
+      const double done = h != 0 ? 1 - left / h : 1;
       for (const Body& body : bodies_) {
         const Pose& pose_now = pose(body, leg);
         const Vec3 low = p.cwiseMin(p + way), high = p.cwiseMax(p + way);
@@ -426,8 +452,9 @@ void Solids<S>::resolve(const Tile<S>& tile, int leg, S drift, const S* const* f
       touched = true;
       p += first.when * way;
       left *= 1 - first.when;
-      if (first.depth > 0 && !pushed) p += std::min(first.depth, kPushSpeed * h) * first.normal, pushed = true;
-      const Vec3 after = answer(first, v, h, i, leg, p, hits);
+      if (first.depth > 0 && !pushed)
+        p += std::min(first.depth, kPushSpeed * std::abs(h)) * first.normal, pushed = true;
+      const Vec3 after = answer(first, v, i, leg, p, hits);
       v = after;
       way = left * v;
       // What keeps pressing into a corner stays where it is.
@@ -465,7 +492,7 @@ void Solids<S>::resolve_exactly(const Tile<S>& tile, int leg, double h, const S*
         const Vec3 n(plane.normal[0], plane.normal[1], plane.normal[2]),
             wall(plane.wall[0], plane.wall[1], plane.wall[2]);
         const double gap = n.dot(x + left * wall) - double(plane.offset);
-        const double speed = n.dot(v - wall), pull = n.dot(a);
+        const double speed = without_rounding(n.dot(v - wall), v), pull = without_rounding(n.dot(a), a);
         double s = std::numeric_limits<double>::infinity();
         const double rounding = 1e-13 * std::max(1.0, std::abs(double(plane.offset)));
         if (gap <= rounding) {
@@ -486,16 +513,22 @@ void Solids<S>::resolve_exactly(const Tile<S>& tile, int leg, double h, const S*
       }
       for (const Body& body : bodies_) {
         const Pose& p = pose(body, leg);
-        const Vec3 wall = h > 0 ? Vec3(p.move / h) : Vec3(Vec3::Zero());
+        const Vec3 move = p.move_at(x), wall = move / h;
         std::visit(
             [&](const auto& shape) {
-              const auto place = [&](double s) { return Vec3(x + s * v + 0.5 * s * s * a - (now + s) / h * p.move); };
+              const auto place = [&](double s) { return Vec3(x + s * v + 0.5 * s * s * a - (now + s) / h * move); };
               const auto gap = [&](double s) { return gap_to(shape, place(s), rule_.radius); };
               double low = 0;
-              if (gap(0) <= 1e-12) {
+              if (const double depth = gap(0); depth <= 1e-12) {
                 const Vec3 n = normal_at(shape, place(0));
-                if ((v - wall).dot(n) < 0 || ((v - wall).dot(n) == 0 && a.dot(n) < 0))
+                // What rounding or the solid's bend left inside comes out.
+                if (depth < -1e-12) x += std::min(-depth, kPushSpeed * h) * n, touched = true;
+                const double speed = without_rounding((v - wall).dot(n), v), pull = without_rounding(a.dot(n), a);
+                if (speed < 0 || (speed == 0 && pull < 0))
                   take(0, n, wall, body.bounce, body.friction);
+                else if (pull < 0 &&
+                         2 * speed / -pull <= left)  // up and down again, as on the plane that touches there
+                  take(2 * speed / -pull, n, wall, body.bounce, body.friction);
                 return;
               }
               for (int piece = 1; piece <= kPieces; ++piece) {
@@ -530,10 +563,22 @@ void Solids<S>::resolve_exactly(const Tile<S>& tile, int leg, double h, const S*
         v += std::max(0.0, approach) * first.normal;
         const double pressed = std::max(0.0, -a.dot(first.normal));
         a += pressed * first.normal;
-        // Dry friction against what slips, by the force that presses.
+        if (hits && approach > slow(first.normal))
+          hits->push_back({i,
+                           leg,
+                           S(approach),
+                           {S(x[0]), S(x[1]), S(x[2])},
+                           {S(first.normal[0]), S(first.normal[1]), S(first.normal[2])}});
+        // Dry friction: against what slips, or, where nothing does, against what would make it.
         const Vec3 slip = (v - first.wall) - (v - first.wall).dot(first.normal) * first.normal;
         const double speed = slip.norm(), loss = first.friction * (std::max(0.0, approach) + pressed * (h - now));
-        if (speed > 0) v -= std::min(1.0, loss / speed) * slip;
+        if (speed > loss) {
+          v -= loss / speed * slip;
+        } else {
+          v -= slip;
+          const double along = a.norm();
+          if (along > 0) a -= std::min(1.0, first.friction * pressed / along) * a;
+        }
         continue;
       }
       const Vec3 relative = v - first.wall, slip = relative + approach * first.normal;
@@ -564,15 +609,15 @@ void Solids<S>::settle(const Tile<S>& tile, int leg, const S* marks) const {
     bool changed = false;
     for (const Body& body : bodies_) {
       const Pose& p = pose(body, leg);
-      if ((x.array() < p.lower.array()).any() || (x.array() > p.upper.array()).any()) continue;
+      const double reach = 0.05 * slow(Vec3(0, 1, 0)) * rule_.step + 1e-5;
+      if ((x.array() < p.lower.array() - reach).any() || (x.array() > p.upper.array() + reach).any()) continue;
       std::visit(
           [&](const auto& shape) {
-            const Vec3 place = x - p.move;
-            const double reach = 0.05 * slow(Vec3(0, 1, 0), h) * h + 1e-5;
+            const Vec3 move = p.move_at(x), place = x - move;
             if (gap_to(shape, place, rule_.radius) > reach) return;
-            const Vec3 n = normal_at(shape, place), wall = h > 0 ? Vec3(p.move / h) : Vec3(Vec3::Zero());
+            const Vec3 n = normal_at(shape, place), wall = h != 0 ? Vec3(move / h) : Vec3(Vec3::Zero());
             const double approach = -(v - wall).dot(n);
-            if (!(approach > 0 && approach < slow(n, h))) return;
+            if (!(approach > 0 && approach < slow(n))) return;
             const Vec3 slip = v - wall + approach * n;
             const double speed = slip.norm();
             v += approach * n;
@@ -609,8 +654,8 @@ void Solids<S>::call_back(const Tile<S>& tile, int leg, std::vector<Hit<S>>* hit
       at_surface.bounce = std::max(collider->restitution, rule_.restitution);
       at_surface.friction = collider->friction;
       const Vec3 x = at<S>(tile.x, i), v = at<S>(tile.v, i);
-      put(tile.v, i, answer(at_surface, v, h, i, leg, x, hits));
-      put(tile.x, i, x + std::min(-gap, std::max(kPushSpeed * h, v.norm() * h)) * at_surface.normal);
+      put(tile.v, i, answer(at_surface, v, i, leg, x, hits));
+      put(tile.x, i, x + std::min(-gap, std::max(kPushSpeed * std::abs(h), v.norm() * h)) * at_surface.normal);
     }
   }
 }

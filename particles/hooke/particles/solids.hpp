@@ -14,6 +14,7 @@ struct ContactRule {
   double radius = 0;       ///< distance kept from surfaces [m]
   double restitution = 0;  ///< the larger of this and the collider's counts
   double rest_speed = 0;   ///< approach speed below which nothing bounces [m/s]
+  double step = 0;         ///< the method's step, whatever its legs [s]
 };
 
 /// The colliders of one tick, placed at the ends of its legs.
@@ -58,6 +59,8 @@ class Solids {
   struct Pose {
     Shape shape;
     Vec3 move{0, 0, 0};
+    Vec3 skew{0, 0, 0};  // a capsule's: by how much more b moves than a
+    Vec3 move_at(const Vec3& place) const;
     Vec3 lower, upper;  // swept, with the radius [m]
   };
   struct Body {
@@ -73,11 +76,10 @@ class Solids {
   };
 
   const Pose& pose(const Body& body, int leg) const { return poses_[body.pose + (body.moves ? std::size_t(leg) : 0)]; }
-  double slow(const Vec3& normal, double drift) const;
+  double slow(const Vec3& normal) const;
   void meet(const Pose& pose, const Body& body, const Vec3& p, const Vec3& way, double done, double left, double drift,
             bool pushed, Meeting& first) const;
-  Vec3 answer(const Meeting& at, const Vec3& v, double drift, Index i, int leg, const Vec3& place,
-              std::vector<Hit<S>>* hits) const;
+  Vec3 answer(const Meeting& at, const Vec3& v, Index i, int leg, const Vec3& place, std::vector<Hit<S>>* hits) const;
 
   std::vector<Plane<S>> planes_;
   Index plane_count_ = 0;
