@@ -29,7 +29,8 @@ inline constexpr double kEstimatedPart = 1.0 / 16;
 /// Repeats the first part of the run with the steps it has and with half of them: their difference / (1 - 2^-p),
 /// with p the method's order (1 where there are colliders), extrapolated to the end as the power of time
 /// it was seen to grow with, between 0.5 and 2.5. Adaptive methods are compared at 1/32 of their tolerance.
-/// Particle systems are left out. Motion that is rough or chaotic may err more. Cost: 3/16 of the run, told in the answer.
+/// Particle systems are left out. Motion that is rough or chaotic may err more. Cost: 3/16 of the run, told in the
+/// answer.
 /// @param like the scene whose run it is, in any state: what was chosen for it is kept
 /// @throws hooke::Error where one of the two diverges
 ErrorEstimate estimate_errors(const Scene& like);
