@@ -424,8 +424,9 @@ void Contacts<S>::touch(Index point, const Solid& before, const Solid& after, co
   const S near = nearest_is_right(after);
   const bool far = at.gap >= 0 || (x - start).squaredNorm() > near * near;
   // What lies on a box has sunk in by rounding, and by what rounding left of its approach: little of its thickness.
-  const S sunk =
-      after.kind == Kind::Box ? std::max(skin(after), S(0.01) * (after.b.minCoeff() + after.radius)) : skin(after);
+  const S sunk = after.kind == Kind::Box
+                     ? std::max(skin(after), std::min(S(0.2) * (after.b.minCoeff() + after.radius), S(1e-4)))
+                     : skin(after);
   if (start_gap >= -sunk && far && after.kind != Kind::HalfSpace && entry(after, start, x, hit)) {
     const Vec outward = normal(after, hit);
     const S beyond = (x - hit).dot(outward);
