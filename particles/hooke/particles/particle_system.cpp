@@ -232,19 +232,31 @@ void ParticleSystem<S>::add_force(std::unique_ptr<Force<S>> force) {
   forces_.push_back(std::move(force));
 }
 
+// From now on somebody dies of age.
+template <class S>
+void ParticleSystem<S>::start_ageing() {
+  if (remaining_.size() > 0) return;
+  remaining_.setConstant(padded_, std::numeric_limits<S>::max());
+  if (settings_.keeps_previous) previous_remaining_ = remaining_;
+}
+
+// From now on masses differ.
+template <class S>
+void ParticleSystem<S>::start_weighing() {
+  if (has_mass_) return;
+  has_mass_ = true;
+  inverse_mass_.setConstant(padded_, S(1 / same_mass_));
+}
+
 template <class S>
 void ParticleSystem<S>::add_emitter(EmitterSettings emitter) {
   emitter.start -= settings_.prewarm;
   emitter.seed = Random(settings_.seed).bits(emitter.seed, emitters_.size());
   Emitter made(std::move(emitter));
   const EmitterSettings& e = made.settings();
-  if (!has_mass_ && inverse_mass_.size() == 0 && emitters_.empty() && count_ == 0) same_mass_ = e.mass.least;
-  if (e.mass.least != same_mass_ || e.mass.most != same_mass_) has_mass_ = true;
-  if (has_mass_ && inverse_mass_.size() == 0) inverse_mass_.setConstant(padded_, S(1 / same_mass_));
-  if (std::isfinite(e.lifetime.least) && remaining_.size() == 0) {
-    remaining_.setConstant(padded_, std::numeric_limits<S>::max());
-    if (settings_.keeps_previous) previous_remaining_ = remaining_;
-  }
+  if (!has_mass_ && emitters_.empty() && count_ == 0) same_mass_ = e.mass.least;
+  if (e.mass.least != same_mass_ || e.mass.most != same_mass_) start_weighing();
+  if (std::isfinite(e.lifetime.least)) start_ageing();
   emitters_.push_back(std::move(made));
 }
 
@@ -274,14 +286,8 @@ void ParticleSystem<S>::add_sub_emitter(SubEmitterSettings sub) {
   wants_births_ |= sub.on == SubEmitterSettings::On::Birth;
   wants_deaths_ |= sub.on == SubEmitterSettings::On::Death;
   wants_impacts_ |= sub.on == SubEmitterSettings::On::Impact;
-  if (std::isfinite(sub.lifetime.least) && remaining_.size() == 0) {
-    remaining_.setConstant(padded_, std::numeric_limits<S>::max());
-    if (settings_.keeps_previous) previous_remaining_ = remaining_;
-  }
-  if (sub.mass != same_mass_ && (!emitters_.empty() || count_ > 0)) {
-    has_mass_ = true;
-    if (inverse_mass_.size() == 0) inverse_mass_.setConstant(padded_, S(1 / same_mass_));
-  }
+  if (std::isfinite(sub.lifetime.least)) start_ageing();
+  if (sub.mass != same_mass_ && (!emitters_.empty() || count_ > 0)) start_weighing();
   sub_random_.emplace_back(Random(settings_.seed).bits(sub.seed, ~std::uint64_t(sub_emitters_.size())));
   sub_emitters_.push_back(sub);
 }
@@ -336,17 +342,12 @@ bool ParticleSystem<S>::append(const Birth& birth, double time_now, const Tick* 
     return false;
   }
   if (birth.mass != same_mass_ && !has_mass_) {
-    if (count_ == 0 && emitters_.empty()) {
+    if (count_ == 0 && emitters_.empty())
       same_mass_ = birth.mass;
-    } else {
-      has_mass_ = true;
-      if (inverse_mass_.size() == 0) inverse_mass_.setConstant(padded_, S(1 / same_mass_));
-    }
+    else
+      start_weighing();
   }
-  if (std::isfinite(birth.lifetime) && remaining_.size() == 0) {
-    remaining_.setConstant(padded_, std::numeric_limits<S>::max());
-    if (settings_.keeps_previous) previous_remaining_ = remaining_;
-  }
+  if (std::isfinite(birth.lifetime)) start_ageing();
   const std::uint32_t slot = free_.back();
   free_.pop_back();
   const Index i = count_++;

@@ -142,6 +142,8 @@ class ParticleSystem final : public Body {
   };
 
   void check_index(Index i) const;
+  void start_ageing();
+  void start_weighing();
   Particle get(Index i) const;
   void put(Index i, const Particle& particle);
   bool append(const Birth& birth, double time_now, const Tick* tick);

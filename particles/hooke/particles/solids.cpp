@@ -180,6 +180,20 @@ double gap_to(const Form& shape, const Vec3& p, double radius) {
   return signed_distance(shape, p) - radius;
 }
 
+// What is left of v after an impact with restitution and Coulomb's friction; `relative` is v seen from the wall.
+Vec3 bounced(const Vec3& v, const Vec3& relative, const Vec3& normal, double approach, double bounce, double friction) {
+  const double impulse = (1 + bounce) * approach;
+  const Vec3 slip = relative + approach * normal;
+  const double speed = slip.norm(), rub = speed > 0 ? std::min(1.0, friction * impulse / speed) : 0;
+  return v + impulse * normal - rub * slip;
+}
+
+template <class S>
+void tell(std::vector<Hit<S>>& hits, Index i, int leg, double approach, const Vec3& place, const Vec3& normal) {
+  hits.push_back(
+      {i, leg, S(approach), {S(place[0]), S(place[1]), S(place[2])}, {S(normal[0]), S(normal[1]), S(normal[2])}});
+}
+
 // A component that is nothing but the rounding of its vector.
 double without_rounding(double component, const Vec3& of) {
   return std::abs(component) <= 1e-14 * of.norm() ? 0 : component;
@@ -401,17 +415,8 @@ Vec3 Solids<S>::answer(const Meeting& at, const Vec3& v, Index i, int leg, const
   if (approach <= 0) return v;
   const double limit = slow(at.normal);
   const double bounce = approach < limit ? 0 : at.bounce;
-  const double impulse = (1 + bounce) * approach;
-  const Vec3 slip = relative + approach * at.normal;
-  const double speed = slip.norm();
-  if (hits && approach >= limit)
-    hits->push_back({i,
-                     leg,
-                     S(approach),
-                     {S(place[0]), S(place[1]), S(place[2])},
-                     {S(at.normal[0]), S(at.normal[1]), S(at.normal[2])}});
-  const double rub = speed > 0 ? std::min(1.0, at.friction * impulse / speed) : 0;
-  return v + impulse * at.normal - rub * slip;
+  if (hits && approach >= limit) tell(*hits, i, leg, approach, place, at.normal);
+  return bounced(v, relative, at.normal, approach, bounce, at.friction);
 }
 
 template <class S>
@@ -563,12 +568,7 @@ void Solids<S>::resolve_exactly(const Tile<S>& tile, int leg, double h, const S*
         v += std::max(0.0, approach) * first.normal;
         const double pressed = std::max(0.0, -a.dot(first.normal));
         a += pressed * first.normal;
-        if (hits && approach > slow(first.normal))
-          hits->push_back({i,
-                           leg,
-                           S(approach),
-                           {S(x[0]), S(x[1]), S(x[2])},
-                           {S(first.normal[0]), S(first.normal[1]), S(first.normal[2])}});
+        if (hits && approach > slow(first.normal)) tell(*hits, i, leg, approach, x, first.normal);
         // Dry friction: against what slips, or, where nothing does, against what would make it.
         const Vec3 slip = (v - first.wall) - (v - first.wall).dot(first.normal) * first.normal;
         const double speed = slip.norm(), loss = first.friction * (std::max(0.0, approach) + pressed * (h - now));
@@ -581,16 +581,8 @@ void Solids<S>::resolve_exactly(const Tile<S>& tile, int leg, double h, const S*
         }
         continue;
       }
-      const Vec3 relative = v - first.wall, slip = relative + approach * first.normal;
-      const double impulse = (1 + first.bounce) * approach, speed = slip.norm();
-      v += impulse * first.normal;
-      if (speed > 0) v -= std::min(1.0, first.friction * impulse / speed) * slip;
-      if (hits)
-        hits->push_back({i,
-                         leg,
-                         S(approach),
-                         {S(x[0]), S(x[1]), S(x[2])},
-                         {S(first.normal[0]), S(first.normal[1]), S(first.normal[2])}});
+      v = bounced(v, v - first.wall, first.normal, approach, first.bounce, first.friction);
+      if (hits) tell(*hits, i, leg, approach, x, first.normal);
     }
     if (!touched) continue;
     const double left = h - now;
@@ -618,10 +610,7 @@ void Solids<S>::settle(const Tile<S>& tile, int leg, const S* marks) const {
             const Vec3 n = normal_at(shape, place), wall = h != 0 ? Vec3(move / h) : Vec3(Vec3::Zero());
             const double approach = -(v - wall).dot(n);
             if (!(approach > 0 && approach < slow(n))) return;
-            const Vec3 slip = v - wall + approach * n;
-            const double speed = slip.norm();
-            v += approach * n;
-            if (speed > 0) v -= std::min(1.0, body.friction * approach / speed) * slip;
+            v = bounced(v, v - wall, n, approach, 0, body.friction);
             changed = true;
           },
           p.shape);
