@@ -1,9 +1,10 @@
 #include <hooke/distance_grid.hpp>
 
+#include <hooke/check_samples.hpp>
+
 #include <algorithm>
 #include <cmath>
 #include <stdexcept>
-#include <string>
 
 namespace hooke {
 
@@ -14,18 +15,7 @@ DistanceGrid::DistanceGrid(const Vec3& lower, double voxel, const std::array<int
       last_(counts[0] - 1, counts[1] - 1, counts[2] - 1),
       counts_(counts),
       values_(std::move(values)) {
-  if (!lower.allFinite()) throw std::invalid_argument("DistanceGrid: lower must be finite");
-  if (!(voxel > 0) || !std::isfinite(voxel))
-    throw std::invalid_argument("DistanceGrid: voxel must be positive, got " + std::to_string(voxel) + " m");
-  std::size_t size = 1;
-  for (const int count : counts) {
-    if (count < 2)
-      throw std::invalid_argument("DistanceGrid: needs two samples a direction, got " + std::to_string(count));
-    size *= std::size_t(count);
-  }
-  if (values_.size() != size)
-    throw std::invalid_argument("DistanceGrid: needs " + std::to_string(size) + " values, got " +
-                                std::to_string(values_.size()));
+  check_samples("DistanceGrid", lower, voxel, counts, values_.size());
   for (const float value : values_)
     if (!std::isfinite(value)) throw std::invalid_argument("DistanceGrid: every value must be finite");
 }

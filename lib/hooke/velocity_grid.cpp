@@ -1,27 +1,17 @@
 #include <hooke/velocity_grid.hpp>
 
+#include <hooke/check_samples.hpp>
+
 #include <algorithm>
 #include <cmath>
 #include <stdexcept>
-#include <string>
 
 namespace hooke {
 
 VelocityGrid::VelocityGrid(const Vec3& lower, double voxel, const std::array<int, 3>& counts,
                            std::vector<Sample> values)
     : lower_(lower), voxel_(voxel), counts_(counts), values_(std::move(values)) {
-  if (!lower.allFinite()) throw std::invalid_argument("VelocityGrid: lower must be finite");
-  if (!(voxel > 0) || !std::isfinite(voxel))
-    throw std::invalid_argument("VelocityGrid: voxel must be positive, got " + std::to_string(voxel) + " m");
-  std::size_t size = 1;
-  for (const int count : counts) {
-    if (count < 2)
-      throw std::invalid_argument("VelocityGrid: needs two samples a direction, got " + std::to_string(count));
-    size *= std::size_t(count);
-  }
-  if (values_.size() != size)
-    throw std::invalid_argument("VelocityGrid: needs " + std::to_string(size) + " values, got " +
-                                std::to_string(values_.size()));
+  check_samples("VelocityGrid", lower, voxel, counts, values_.size());
   for (const Sample& value : values_)
     if (!value.allFinite()) throw std::invalid_argument("VelocityGrid: every value must be finite");
 }

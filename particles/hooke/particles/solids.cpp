@@ -170,7 +170,7 @@ double gap_to(const Box& shape, const Vec3& p, double radius) {
 }
 double gap_to(const LevelSet& shape, const Vec3& p, double radius) {
   const Vec3 q = p - shape.offset;
-  const double away = (q - q.cwiseMax(shape.grid->lower()).cwiseMin(shape.grid->upper())).norm();
+  const double away = shape.grid->away(q);
   // The solid is inside of its grid.
   if (away > 0) return std::max(away - radius, std::numeric_limits<double>::min());
   return shape.grid->distance(q) - radius;
