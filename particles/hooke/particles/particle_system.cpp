@@ -598,8 +598,7 @@ void ParticleSystem<S>::integrate(Tile<S>& tile, Index first, Plan& plan, Worker
     if (!w.integrator->step(dynamics, w.x, w.v, t, plan.h).converged) w.finite = false;
     if (plan.exact && plan.solids.any()) {
       Tile<S> view = contact.view(w.x, w.v);
-      std::fill_n(w.marks.data(), tile.count, S(0));
-      plan.solids.resolve_exactly(view, s, plan.h, w.x0, w.v0, w.marks.data(), plan.hits ? &w.hits : nullptr);
+      plan.solids.resolve_exactly(view, s, plan.h, w.x0, w.v0, plan.hits ? &w.hits : nullptr);
       if (plan.solids.callbacks()) plan.solids.call_back(view, s, plan.hits ? &w.hits : nullptr);
       w.integrator->restart();
     }
@@ -684,8 +683,7 @@ void ParticleSystem<S>::flight(Tile<S>& tile, Index first, Plan& plan, Worker& w
     landing_flight.planes = solids.planes(step), landing_flight.plane_count = solids.plane_count();
     fly(tile, landing_flight);
     if (plan.exact && solids.any()) {
-      std::fill_n(w.marks.data(), tile.count, S(0));
-      solids.resolve_exactly(tile, run, plan.h, w.x0, w.v0, w.marks.data(), hits);
+      solids.resolve_exactly(tile, run, plan.h, w.x0, w.v0, hits);
       if (solids.callbacks()) solids.call_back(tile, run, hits);
     } else if (solids.bodies() && last_run) {
       if (solids.mark(tile, step, S(0), nullptr, w.marks.data())) solids.settle(tile, step, w.marks.data());

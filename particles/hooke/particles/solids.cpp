@@ -473,12 +473,11 @@ void Solids<S>::resolve(const Tile<S>& tile, int leg, S drift, const S* const* f
 
 template <class S>
 void Solids<S>::resolve_exactly(const Tile<S>& tile, int leg, double h, const S* const x0[3], const S* const v0[3],
-                                const S* marks, std::vector<Hit<S>>* hits) const {
+                                std::vector<Hit<S>>* hits) const {
   // As many impacts as a ball that comes to rest makes within a step.
   constexpr int kMostImpacts = 10'000;
   constexpr int kPieces = 32;
   for (Index i = 0; i < tile.count; ++i) {
-    if (marks[i] > 0) continue;
     Vec3 x = at<S>(x0, i), v = at<S>(v0, i);
     Vec3 a = (at<S>(tile.v, i) - v) / h;
     double now = 0;

@@ -43,7 +43,7 @@ class Solids {
   /// The way is x0 + v0 s + ½ a s², a from the velocities before (v0) and after: impact times are solved on it, as
   /// many as there are.
   void resolve_exactly(const Tile<S>& tile, int leg, double h, const S* const x0[3], const S* const v0[3],
-                       const S* marks, std::vector<Hit<S>>* hits) const;
+                       std::vector<Hit<S>>* hits) const;
 
   /// Marked particles that press slowly into a body stop doing so.
   void settle(const Tile<S>& tile, int leg, const S* marks) const;
