@@ -90,6 +90,7 @@ void Contacts<S>::begin_tick(std::span<const Collider> colliders, const PointMas
   origin_ = points.origin;
   thickness_ = S(thickness);
   tick_end_ = t1;
+  before_ = t1;
   now_ = t0;
   callbacks_.clear();
   for (const Collider& collider : colliders)
@@ -458,13 +459,58 @@ void Contacts<S>::settle(Points<S>& v) const {
   }
 }
 
+// The solids at both ends of a substep.
 template <class S>
-void Contacts<S>::resolve(double t0, const Points<S>& from, double t1, const Values<S>& inverse_mass, Points<S>& x,
-                          Points<S>& v) {
+void Contacts<S>::place_both(double t0, double t1) {
+  if (t0 == before_ && t1 == now_) return;
   if (t0 != now_) place_solids(t0, solids_);
   std::swap(previous_, solids_);
   place_solids(t1, solids_);
-  now_ = t1;
+  before_ = t0, now_ = t1;
+}
+
+// Distances and normals of all points from a user's solid.
+template <class S>
+void Contacts<S>::ask(const Collider& callback, double t, const Points<S>& x) {
+  world_ = x.template cast<double>().rowwise() + origin_.transpose().array();
+  distance_.setConstant(x.rows(), std::numeric_limits<double>::infinity());
+  normal_.setZero(x.rows(), 3);
+  callback.distance(t, world_, distance_, normal_);
+}
+
+template <class S>
+void Contacts<S>::planes(double t0, const Points<S>& x, double t1, S reach, const Values<S>& inverse_mass,
+                         std::vector<ContactPlane<S>>& out) {
+  place_both(t0, t1);
+  const S push = S(kPushSpeed) * S(t1 - t0);
+  // What is inside stays so unless it is pushed out.
+  const auto leave = [&](S gap) { return gap < 0 ? std::max(gap, -push) : gap; };
+  for (const Candidate& candidate : candidates_) {
+    const Index i = candidate.point;
+    if (inverse_mass[i] == 0) continue;
+    const Solid &before = previous_[std::size_t(candidate.solid)], &after = solids_[std::size_t(candidate.solid)];
+    const Vec from = row(x, i), start = carried(before, after, from);
+    if (after.kind == Kind::LevelSet && clearance(after, start, reach) > reach) continue;
+    Surface at = surface(after, start);
+    if (!(at.gap <= reach)) continue;
+    if (after.kind == Kind::LevelSet) at.normal = normal(after, start);
+    out.push_back({i, at.normal, leave(at.gap), start - from, after.friction, after.restitution});
+  }
+  for (const Collider* collider : callbacks_) {
+    ask(*collider, t1, x);
+    for (Index i = 0; i < x.rows(); ++i) {
+      const double gap = distance_[i] - double(thickness_);
+      if (inverse_mass[i] == 0 || !(gap <= double(reach))) continue;
+      out.push_back({i, normal_.row(i).matrix().transpose().template cast<S>(), leave(S(gap)), Vec(0, 0, 0),
+                     S(collider->friction), S(collider->restitution)});
+    }
+  }
+}
+
+template <class S>
+void Contacts<S>::resolve(double t0, const Points<S>& from, double t1, const Values<S>& inverse_mass, Points<S>& x,
+                          Points<S>& v) {
+  place_both(t0, t1);
   const S h = S(t1 - t0);
   touches_.clear();
   if (!solids_.empty()) {
@@ -492,10 +538,7 @@ void Contacts<S>::resolve(double t0, const Points<S>& from, double t1, const Val
     }
   }
   for (const Collider* collider : callbacks_) {
-    world_ = x.template cast<double>().rowwise() + origin_.transpose().array();
-    distance_.setConstant(x.rows(), std::numeric_limits<double>::infinity());
-    normal_.setZero(x.rows(), 3);
-    collider->distance(t1, world_, distance_, normal_);
+    ask(*collider, t1, x);
     Solid solid;  // a plane through the nearest surface point, for this point and moment
     solid.kind = Kind::HalfSpace;
     solid.friction = S(collider->friction);

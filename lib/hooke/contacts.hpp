@@ -6,6 +6,17 @@
 
 namespace hooke {
 
+/// A plane that one point may not cross within a substep: normal · Δx >= normal · carried - gap, with Δx from
+/// where it began.
+template <class S>
+struct ContactPlane {
+  Index point;
+  Eigen::Matrix<S, 3, 1> normal;   ///< unit, out of the solid
+  S gap;                           ///< [m], how far it may come nearer; negative: how far it must leave
+  Eigen::Matrix<S, 3, 1> carried;  ///< [m], the way on which the solid takes its start along
+  S friction, restitution;
+};
+
 /// Keeps points at least `thickness` outside of the colliders' surfaces.
 ///
 /// Candidates (point, shape) are found once a tick from swept bounds, and again in the
@@ -33,6 +44,13 @@ class Contacts {
   /// Takes from v what presses into the surfaces touched by the last `resolve`, and rubs: for
   /// methods that end with a kick, which knows nothing of contacts.
   void settle(Points<S>& v) const;
+
+  /// For methods that solve for contacts together with forces: appends, by solid and point, the planes that free
+  /// points at x must not cross between t0 and t1, as far as they are within `reach` [m] of them at t1. Curved solids
+  /// are planes at the point nearest to where they carry the start; what starts inside must leave at no more than the
+  /// push speed. `resolve` afterwards finds what went farther than `reach`. Between begin_tick and the tick's end.
+  void planes(double t0, const Points<S>& x, double t1, S reach, const Values<S>& inverse_mass,
+              std::vector<ContactPlane<S>>& out);
 
   /// Speed at which points that start inside a solid are pushed out [m/s].
   static constexpr double kPushSpeed = 2;
@@ -68,6 +86,8 @@ class Contacts {
   void find_box_gaps(const Solid& solid, const Points<S>& x, Index first, Index n);
   void find_grid_gaps(const Solid& solid, const Points<S>& x, Index first, Index n, S near);
   void place_solids(double t, std::vector<Solid>& out);
+  void place_both(double t0, double t1);
+  void ask(const Collider& callback, double t, const Points<S>& x);
   static S moved(const Solid& before, const Solid& after);
   static void bounds(const Solid& solid, Vec& low, Vec& high);
   static S clearance(const Solid& solid, const Vec& x, S near);
@@ -86,7 +106,7 @@ class Contacts {
   std::span<const Collider> colliders_;
   Vec3 origin_{0, 0, 0};
   S thickness_ = 0;
-  double tick_end_ = 0, now_ = 0;
+  double tick_end_ = 0, before_ = 0, now_ = 0;  // previous_ and solids_ belong to before_ and now_
   std::vector<Shape> shapes_;
   std::vector<Solid> solids_, previous_;
   std::vector<S> solid_move_;

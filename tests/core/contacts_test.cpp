@@ -488,5 +488,58 @@ TEST(Colliders, RefuseWhatMakesNoSense) {
   EXPECT_THROW(world.add_collider(solid(HalfSpace{}, 0, 1.5)), std::invalid_argument);
 }
 
+// The planes of `points` between t0 and t1, as a body of that state asks for them.
+template <class S>
+std::vector<ContactPlane<S>> planes_of(const std::vector<Collider>& colliders, const PointMasses<S>& points, double t0,
+                                       double t1, S reach) {
+  Contacts<S> contacts;
+  contacts.begin_tick(colliders, points, t0, t1, 0);
+  std::vector<ContactPlane<S>> out;
+  contacts.planes(t0, points.position, t1, reach, points.inverse_mass, out);
+  return out;
+}
+
+TYPED_TEST(Contact, PlanesTellHowFarAPointMayGo) {
+  using S = TypeParam;
+  constexpr double kStep = 1.0 / 240;
+  const PointMasses<S> points = point<S>({0.1, 0.52, 0}, {0, 0, 0});
+  const auto all = [](double t, const Points<double>& x, Values<double>& distance, Points<double>& normal) {
+    EXPECT_DOUBLE_EQ(t, kStep);
+    distance = x.col(1) - 0.5;
+    normal.col(1).setOnes();
+  };
+  std::vector<Collider> colliders = {solid(HalfSpace{{0, 1, 0}, 0.5}, 0.3, 0.7),
+                                     solid(Box{{0, 0, 0}, {0.5, 0.5, 0.5}}),
+                                     solid(LevelSet{ball_grid(0.02), {0.1, 0, 0}}),
+                                     {"user's", {}, {}, all, 0.2, 0}};
+  const auto planes = planes_of<S>(colliders, points, 0, kStep, S(0.05));
+  ASSERT_EQ(planes.size(), 4u);
+  for (const auto& plane : planes) {
+    EXPECT_EQ(plane.point, 0);
+    EXPECT_NEAR(plane.gap, 0.02, 1e-4);
+    EXPECT_NEAR(plane.normal[1], 1, 1e-3);
+    EXPECT_EQ(plane.carried.norm(), S(0));
+  }
+  EXPECT_EQ(planes[0].friction, S(0.3));
+  EXPECT_EQ(planes[0].restitution, S(0.7));
+  EXPECT_TRUE(planes_of<S>(colliders, points, 0, kStep, S(0.01)).empty());
+}
+
+TYPED_TEST(Contact, PlanesGoWithTheSolidAndPushOutSlowly) {
+  using S = TypeParam;
+  constexpr double kStep = 1.0 / 240;
+  const std::vector<Collider> colliders = {moving([](double t) { return Shape(Sphere{{3 * t, 0, 0}, 0.5}); })};
+  auto planes = planes_of<S>(colliders, point<S>({0, 0.5, 0}, {0, 0, 0}), 0, kStep, S(0.1));
+  ASSERT_EQ(planes.size(), 1u);
+  EXPECT_NEAR(planes[0].gap, 0, 1e-6);
+  EXPECT_NEAR(planes[0].carried[0], 3 * kStep, 1e-6);
+  planes = planes_of<S>(colliders, point<S>({0, 0.3, 0}, {0, 0, 0}), 0, kStep, S(0.1));
+  ASSERT_EQ(planes.size(), 1u);
+  EXPECT_NEAR(planes[0].gap, -Contacts<S>::kPushSpeed * kStep, 1e-6);
+  PointMasses<S> held = point<S>({0, 0.5, 0}, {0, 0, 0});
+  held.inverse_mass[0] = 0;
+  EXPECT_TRUE(planes_of<S>(colliders, held, 0, kStep, S(0.1)).empty());
+}
+
 }  // namespace
 }  // namespace hooke::test
