@@ -1,6 +1,7 @@
 #include <hooke/softbody/soft_body.hpp>
 
 #include <hooke/softbody/spring_field.hpp>
+#include <hooke/softbody/volume_field.hpp>
 
 #include <stdexcept>
 
@@ -31,6 +32,8 @@ std::unique_ptr<Body> make(const SoftBodySettings& s) {
   if (!filtered && s.network && !s.network->springs.empty())
     body->add_field(
         std::make_unique<SpringField<S>>(s.network, body->state().position, s.precision == Precision::DoubleFloat));
+  if (s.volume_stiffness != 0)
+    body->add_field(std::make_unique<VolumeField<S>>(s.volume_stiffness, s.triangles, body->state().position));
   if (s.wind) body->add_field(std::make_unique<WindField<S>>(*s.wind, s.triangles, n));
   if (s.linear_drag != 0) body->add_field(std::make_unique<LinearDrag<S>>(s.linear_drag));
   if (s.quadratic_drag != 0) body->add_field(std::make_unique<QuadraticDrag<S>>(s.quadratic_drag));
@@ -55,12 +58,25 @@ std::string_view precision_name(Precision precision) {
   return precision == Precision::Float ? "float" : precision == Precision::Double ? "double" : "double-float";
 }
 
-SoftBodySettings settings_of(const Cloth& cloth) {
+namespace {
+
+template <class Form>
+SoftBodySettings taken_from(const Form& form) {
   SoftBodySettings settings;
-  settings.positions = cloth.positions;
-  settings.masses = cloth.masses;
-  settings.network = cloth.network;
-  settings.triangles = cloth.triangles;
+  settings.positions = form.positions;
+  settings.masses = form.masses;
+  settings.network = form.network;
+  settings.triangles = form.triangles;
+  return settings;
+}
+
+}  // namespace
+
+SoftBodySettings settings_of(const Cloth& cloth) { return taken_from(cloth); }
+
+SoftBodySettings settings_of(const Lattice& lattice) {
+  SoftBodySettings settings = taken_from(lattice);
+  settings.volume_stiffness = lattice.volume_stiffness;
   return settings;
 }
 

@@ -4,6 +4,7 @@
 #include <hooke/point_body.hpp>
 #include <hooke/softbody/cloth.hpp>
 #include <hooke/softbody/filtered_leapfrog.hpp>
+#include <hooke/softbody/lattice.hpp>
 #include <hooke/softbody/wind.hpp>
 
 #include <optional>
@@ -31,6 +32,7 @@ struct SoftBodySettings {
   std::shared_ptr<const SpringNetwork> network;  ///< may be shared by many bodies; null: no springs
   std::vector<Triangle> triangles;               ///< for wind and drawing
   std::vector<Index> pins;                       ///< held from the start
+  double volume_stiffness = 0;                   ///< of what the triangles enclose [Pa], as VolumeField; 0: none
   std::optional<Wind> wind;                      ///< absent: no air at all
   double linear_drag = 0;                        ///< on every point [N·s/m]
   double quadratic_drag = 0;                     ///< on every point [N·s²/m²]
@@ -41,8 +43,11 @@ struct SoftBodySettings {
 
 /// Takes points, masses, springs and triangles from a cloth.
 SoftBodySettings settings_of(const Cloth& cloth);
+/// The same from a lattice, with its volume stiffness.
+SoftBodySettings settings_of(const Lattice& lattice);
 
-/// Builds the body. A soft body is a PointBody with a SpringField and, where asked for, wind and drag.
+/// Builds the body. A soft body is a PointBody with a SpringField and, where asked for, volume, wind
+/// and drag.
 /// @throws std::invalid_argument naming the body, the rule and the value
 std::unique_ptr<Body> make_soft_body(const SoftBodySettings& settings);
 
