@@ -48,7 +48,8 @@ class Contacts {
   /// For methods that solve for contacts together with forces: appends, by solid and point, the planes that free
   /// points at x must not cross between t0 and t1, as far as they are within `reach` [m] of them at t1. Curved solids
   /// are planes at the point nearest to where they carry the start; what starts inside must leave at no more than the
-  /// push speed. `resolve` afterwards finds what went farther than `reach`. Between begin_tick and the tick's end.
+  /// push speed. Only what its speed lets a point meet in the tick is looked at
+  /// (and what is within 5 mm); `resolve` afterwards finds what went farther. Between begin_tick and the tick's end.
   void planes(double t0, const Points<S>& x, double t1, S reach, const Values<S>& inverse_mass,
               std::vector<ContactPlane<S>>& out);
 

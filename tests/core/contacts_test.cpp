@@ -502,7 +502,7 @@ std::vector<ContactPlane<S>> planes_of(const std::vector<Collider>& colliders, c
 TYPED_TEST(Contact, PlanesTellHowFarAPointMayGo) {
   using S = TypeParam;
   constexpr double kStep = 1.0 / 240;
-  const PointMasses<S> points = point<S>({0.1, 0.52, 0}, {0, 0, 0});
+  const PointMasses<S> points = point<S>({0.1, 0.503, 0}, {0, 0, 0});
   const auto all = [](double t, const Points<double>& x, Values<double>& distance, Points<double>& normal) {
     EXPECT_DOUBLE_EQ(t, kStep);
     distance = x.col(1) - 0.5;
@@ -516,13 +516,13 @@ TYPED_TEST(Contact, PlanesTellHowFarAPointMayGo) {
   ASSERT_EQ(planes.size(), 4u);
   for (const auto& plane : planes) {
     EXPECT_EQ(plane.point, 0);
-    EXPECT_NEAR(plane.gap, 0.02, 1e-4);
+    EXPECT_NEAR(plane.gap, 0.003, 1e-4);
     EXPECT_NEAR(plane.normal[1], 1, 1e-3);
     EXPECT_EQ(plane.carried.norm(), S(0));
   }
   EXPECT_EQ(planes[0].friction, S(0.3));
   EXPECT_EQ(planes[0].restitution, S(0.7));
-  EXPECT_TRUE(planes_of<S>(colliders, points, 0, kStep, S(0.01)).empty());
+  EXPECT_TRUE(planes_of<S>(colliders, points, 0, kStep, S(0.002)).empty());
 }
 
 TYPED_TEST(Contact, PlanesGoWithTheSolidAndPushOutSlowly) {
