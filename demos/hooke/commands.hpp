@@ -17,6 +17,9 @@ struct SimulateOptions {
   std::string export_format;   ///< empty: none
   bool estimate_error = true;  ///< by halving the steps of a first part
   bool verify = false;         ///< by a converged run
+  /// Simulated seconds between checkpoints; 0: none; absent: as often as they cost little.
+  std::optional<double> checkpoint;
+  bool resume = false;  ///< from the checkpoint in `out`
 };
 int simulate(const SimulateOptions& options);
 

@@ -51,7 +51,7 @@ Exports::Exports(const std::string& format, const scene::Scene& scene) : scene_(
       left_out_ += particles.body().name() + ": not exported, " + format + " is for soft bodies\n";
 }
 
-void Exports::open(const std::filesystem::path& folder) {
+void Exports::open(const std::filesystem::path& folder, std::int64_t frames) {
   folder_ = folder;
   std::set<std::string> taken;
   if (meshes_)
@@ -61,6 +61,13 @@ void Exports::open(const std::filesystem::path& folder) {
   if (points_)
     for (const scene::SceneParticles& particles : scene_.particles)
       names_.push_back(file_name(particles.body().name(), taken));
+  frame_ = frames;
+  for (std::size_t i = 0; i < caches_.size() && frames > 0; ++i)
+    caches_[i]->resume(Index(frames), scene_.bodies[i].body->size());
+}
+
+void Exports::sync() {
+  for (const auto& cache : caches_) cache->sync();
 }
 
 void Exports::add() {
@@ -118,8 +125,10 @@ void Exports::write_volumes(const scene::SceneParticles& particles, const scene:
   }
 }
 
-CountsTable::CountsTable(const std::filesystem::path& path) : file_(path, io::OutputFile::Leftover::Keep) {
-  file_.write("time,body,alive,born,died,refused,displaced,impacts\n");
+CountsTable::CountsTable(const std::filesystem::path& path, std::int64_t keep)
+    : file_(keep < 0 ? io::OutputFile(path, io::OutputFile::Leftover::Keep)
+                     : io::OutputFile(path, io::OutputFile::Leftover::Keep, keep)) {
+  if (keep < 0) file_.write("time,body,alive,born,died,refused,displaced,impacts\n");
 }
 
 void CountsTable::add(const scene::Scene& scene) {

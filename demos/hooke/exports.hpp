@@ -23,9 +23,11 @@ class Exports {
   /// @throws hooke::Error where no body of the scene can be written so
   Exports(const std::string& format, const scene::Scene& scene);
 
-  /// Begins the files. `folder` must exist. Throws hooke::OutputError, as do the others.
-  void open(const std::filesystem::path& folder);
+  /// Begins the files, or goes on after the first `frames` frames of an earlier run. `folder` must exist.
+  /// Throws hooke::OutputError, as do the others, and hooke::Error where those frames are not there.
+  void open(const std::filesystem::path& folder, std::int64_t frames);
   void add();
+  void sync();
   void finish();
   /// Bodies that are left out, a line each.
   const std::string& left_out() const { return left_out_; }
@@ -47,8 +49,10 @@ class Exports {
 /// particles.csv: a row a frame and particle system. What was written stays readable when a run is cut off.
 class CountsTable {
  public:
-  explicit CountsTable(const std::filesystem::path& path);
+  /// @param keep bytes of an earlier run's table after which this one goes on; < 0: a new one
+  CountsTable(const std::filesystem::path& path, std::int64_t keep);
   void add(const scene::Scene& scene);
+  std::int64_t sync() { return file_.sync(), file_.size(); }
   void finish() { file_.commit(); }
 
  private:

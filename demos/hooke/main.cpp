@@ -27,7 +27,7 @@ struct Arguments {
   RenderOptions render;
   ReportOptions report;
   std::string validate_scene, size;
-  bool resume = false, list = false, no_estimate = false;
+  bool list = false, no_estimate = false;
 };
 
 void add_run_options(CLI::App& command, RunOptions& run) {
@@ -78,7 +78,11 @@ int dispatch(int argc, char** argv) {
   simulate_command->add_flag("--no-error-estimate", a.no_estimate, "Spares the error estimate, 0.19 of the run's cost");
   simulate_command->add_flag("--verify", a.simulate.verify,
                              "Tells the true error by a converged run; costs tens of times the run");
-  simulate_command->add_flag("--resume", a.resume, "Not available: there are no checkpoints yet");
+  simulate_command->add_option("--checkpoint", a.simulate.checkpoint,
+                               "Simulated seconds between checkpoints (OUT/checkpoint), 0 for none; without it one "
+                               "each 10 s by the clock, or seldomer where they would cost over 1 %");
+  simulate_command->add_flag("--resume", a.simulate.resume,
+                             "Goes on from OUT/checkpoint, with the same scene and options, to the same bits");
   simulate_command->footer(
       "Example: hooke simulate hanging-sheet-32 --method velocity-verlet --precision double --out sheet");
 
@@ -119,8 +123,9 @@ int dispatch(int argc, char** argv) {
     return tell(kBadInput, std::string(error.what()) + " (hooke --help)");
   }
   if (simulate_command->parsed()) {
-    if (a.resume) throw Error("--resume is not available: runs leave no checkpoints yet; run again without it");
     check(*simulate_command, a.simulate.run);
+    if (const auto seconds = a.simulate.checkpoint; seconds && !(*seconds >= 0 && std::isfinite(*seconds)))
+      throw Error("--checkpoint must not be negative [s], got " + std::to_string(*seconds));
     if (simulate_command->count("--error")) {
       const double error = a.simulate.run.error;
       if (!(error > 0 && std::isfinite(error)))

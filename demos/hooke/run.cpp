@@ -116,12 +116,16 @@ int RunResult::exit_code() const {
   return interrupted ? kInterrupted : kDone;
 }
 
-RunResult run(scene::Scene& scene, double end, const FrameWork& frame) {
+RunResult start_of(const scene::Scene& scene) {
   RunResult result;
-  World& world = scene.world;
-  const double preroll = scene.description.preroll, rate = scene.description.frame_rate;
   for (std::size_t i = 0; i < scene.bodies.size(); ++i)
     if (scene.bodies[i].wears >= 0) result.capes.emplace_back(scene, i);
+  return result;
+}
+
+RunResult run(scene::Scene& scene, double end, const FrameWork& frame, const BetweenFrames& between, RunResult result) {
+  World& world = scene.world;
+  const double preroll = scene.description.preroll, rate = scene.description.frame_rate;
   // A last frame that is shorter than the others ends with the run.
   result.wanted_frames = std::int64_t(std::ceil(end * rate - 1e-6)) + 1;
 
@@ -133,12 +137,16 @@ RunResult run(scene::Scene& scene, double end, const FrameWork& frame) {
     return result;
   };
   const std::int64_t preroll_frames = std::int64_t(std::ceil(preroll * rate - 1e-6));
-  for (std::int64_t i = 1; i <= preroll_frames; ++i) {
+  for (std::int64_t i = result.preroll_frames + 1; i <= preroll_frames; ++i) {
     result.report = advance(world, std::min(double(i) / rate, preroll), result);
-    if (!result.report.good() || interrupted()) return finish();
+    if (!result.report.good()) return finish();
+    result.preroll_frames = i;
+    const bool last = interrupted();
+    between(result, last);
+    if (last) return finish();
     progress.show(double(i) / rate / (preroll + end));
   }
-  for (std::int64_t i = 0; i < result.wanted_frames; ++i) {
+  for (std::int64_t i = result.frames; i < result.wanted_frames; ++i) {
     const double wall = result.wall;
     const int looks = result.capes.empty() ? 1 : kLooksPerFrame;
     for (int look = 1; look <= looks && i > 0; ++look) {
@@ -152,7 +160,10 @@ RunResult run(scene::Scene& scene, double end, const FrameWork& frame) {
     frame(i, 1e3 * (result.wall - wall));
     result.frames = i + 1;
     progress.show(std::min(1.0, (preroll + double(i) / rate) / (preroll + end)));
-    if (interrupted() && result.frames < result.wanted_frames) return finish();
+    if (result.frames == result.wanted_frames) break;
+    const bool last = interrupted();
+    between(result, last);
+    if (last) return finish();
   }
   finish();
   result.interrupted = false;

@@ -53,7 +53,8 @@ double cpu_seconds();
 struct RunResult {
   StepReport report;
   bool interrupted = false;
-  std::int64_t frames = 0;  ///< finished, the one at time 0 included
+  std::int64_t preroll_frames = 0;  ///< finished, of the preroll
+  std::int64_t frames = 0;          ///< finished, the one at time 0 included
   std::int64_t wanted_frames = 0;
   double shown_time = 0;     ///< [s]
   double wall = 0, cpu = 0;  ///< of the simulation alone [s], preroll included
@@ -67,8 +68,19 @@ struct RunResult {
 /// Called for the state at time 0 and after each frame, with the milliseconds of simulation.
 using FrameWork = std::function<void(std::int64_t frame, double simulate_ms)>;
 
-/// Simulates the preroll and then the frames up to `end` [s].
-RunResult run(scene::Scene& scene, double end, const FrameWork& frame);
+/// Called between frames, those of the preroll included, where the run can be left and gone on with.
+/// @param last the run was interrupted and ends here
+using BetweenFrames = std::function<void(const RunResult& result, bool last)>;
+
+/// A run that has not begun.
+RunResult start_of(const scene::Scene& scene);
+
+/// Simulates the preroll and then the frames up to `end` [s], from where `result` and the world stand.
+RunResult run(scene::Scene& scene, double end, const FrameWork& frame, const BetweenFrames& between, RunResult result);
+inline RunResult run(scene::Scene& scene, double end, const FrameWork& frame) {
+  return run(
+      scene, end, frame, [](const RunResult&, bool) {}, start_of(scene));
+}
 
 /// What was chosen, a line a body.
 std::string chosen(const scene::Scene& scene);

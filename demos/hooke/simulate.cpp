@@ -1,27 +1,45 @@
 #include "commands.hpp"
 #include "exports.hpp"
 
+#include <hooke/checkpoint.hpp>
 #include <hooke/error.hpp>
 #include <hooke/io/tables.hpp>
 #include <scene/accuracy.hpp>
 
+#include <algorithm>
+#include <cmath>
 #include <cstdio>
+#include <fstream>
 #include <optional>
+#include <sstream>
 
 namespace hooke::command {
 
 namespace {
 
+// How much of its tables a run had written [bytes]; < 0: nothing yet.
+struct Written {
+  std::int64_t diagnostics = -1, timings = -1, counts = -1;
+};
+
 // The files of one run.
 class Outputs {
  public:
-  Outputs(const SimulateOptions& options, const scene::Scene& scene, Exports& exports)
+  // Goes on after `frames` frames and what was written until then.
+  Outputs(const SimulateOptions& options, const scene::Scene& scene, Exports& exports, const Written& written,
+          std::int64_t frames)
       : folder_(options.out),
-        diagnostics_(folder_ / "diagnostics.csv"),
-        timings_(folder_ / "timings.csv"),
+        diagnostics_(folder_ / "diagnostics.csv", written.diagnostics),
+        timings_(folder_ / "timings.csv", written.timings),
         exports_(exports) {
-    if (!scene.particles.empty()) counts_.emplace(folder_ / "particles.csv");
-    exports_.open(folder_);
+    if (!scene.particles.empty()) counts_.emplace(folder_ / "particles.csv", written.counts);
+    exports_.open(folder_, frames);
+  }
+
+  // Everything so far is on the disk.
+  Written sync() {
+    exports_.sync();
+    return {diagnostics_.sync(), timings_.sync(), counts_ ? counts_->sync() : -1};
   }
 
   void add(const scene::Scene& scene, double simulate_ms) {
@@ -112,31 +130,133 @@ void print_verification(const scene::Scene& scene) {
                 body.error, body.error / body.size, body.uncertainty);
 }
 
+// Of a default run: least time between checkpoints by the clock [s], and most of it that they may take.
+constexpr double kCheckpointPause = 10, kCheckpointShare = 0.01;
+
+// DIR/checkpoint: where a run stands between two frames.
+class Checkpoints {
+ public:
+  Checkpoints(const SimulateOptions& options, const scene::Scene& scene)
+      : path_(options.out / "checkpoint"), interval_(options.checkpoint), last_(wall_seconds()) {
+    std::ifstream file(scene.description.file, std::ios::binary);
+    std::ostringstream contents;
+    if (file) contents << file.rdbuf();
+    CheckpointWriter scene_bytes;
+    scene_bytes.add(std::string_view(file ? "" : scene.description.file));
+    const std::string bytes = contents.str();
+    scene_bytes.add(std::span<const char>(bytes.data(), bytes.size()));
+    settings_.add("program", HOOKE_VERSION);
+    settings_.add_sum("scene", scene_bytes);
+    settings_.add("--method", options.run.method);
+    settings_.add("--precision", options.run.precision);
+    settings_.add("--dt", options.run.dt);
+    settings_.add("--error", options.run.error);
+    settings_.add("--end", options.run.end);
+    settings_.add("--export", options.export_format);
+  }
+
+  void remove() const {
+    std::error_code ignored;
+    std::filesystem::remove(path_, ignored);
+  }
+
+  // Puts the scene and the run where they were.
+  void load(scene::Scene& scene, RunResult& run, Written& written) {
+    std::ifstream file(path_, std::ios::binary);
+    if (!file)
+      throw Error(path_.string() +
+                  ": there is no checkpoint to resume from; a finished run leaves none. Run again without "
+                  "--resume");
+    CheckpointReader in = CheckpointReader::read(file, path_.string());
+    in.begin("run");
+    settings_.check(in);
+    run.preroll_frames = in.number<std::int64_t>("frames of the preroll", 0);
+    run.frames = in.number<std::int64_t>("frames", 0);
+    for (std::int64_t* bytes : {&written.diagnostics, &written.timings, &written.counts})
+      *bytes = in.number<std::int64_t>("bytes written", -1);
+    for (scene::CapeFigures& cape : run.capes) cape.load(in);
+    in.end();
+    scene.world.load(in);
+    in.finish();
+    saved_ = scene.world.time();
+  }
+
+  bool due(const scene::Scene& scene, bool last) const {
+    if (interval_ && *interval_ == 0) return false;
+    if (last) return true;
+    if (!interval_) return wall_seconds() - last_ >= std::max(kCheckpointPause, cost_ / kCheckpointShare);
+    const auto number = [&](double time) { return std::floor(time / *interval_ + 1e-9); };
+    return number(scene.world.time()) > number(saved_);
+  }
+
+  void save(const scene::Scene& scene, const RunResult& run, const Written& written) {
+    const double begin = wall_seconds();
+    CheckpointWriter out;
+    out.begin("run");
+    settings_.save(out);
+    out.add(run.preroll_frames);
+    out.add(run.frames);
+    for (const std::int64_t bytes : {written.diagnostics, written.timings, written.counts}) out.add(bytes);
+    for (const scene::CapeFigures& cape : run.capes) cape.save(out);
+    out.end();
+    scene.world.save(out);
+    io::OutputFile file(path_);
+    file.write(out.file());
+    file.sync();
+    file.commit();
+    saved_ = scene.world.time();
+    last_ = wall_seconds();
+    cost_ = last_ - begin;
+  }
+
+ private:
+  std::filesystem::path path_;
+  std::optional<double> interval_;
+  Blueprint settings_;
+  double saved_ = -1e300;       // world time of the last one [s]; none yet
+  double last_ = 0, cost_ = 0;  // by the clock [s]
+};
+
 }  // namespace
 
 int simulate(const SimulateOptions& options) {
   if (!options.export_format.empty()) check_export_format(options.export_format);
   scene::Scene scene = prepare(options.run);
   Exports exports(options.export_format, scene);
-  io::make_folder(options.out);
-  Outputs outputs(options, scene, exports);
+  Checkpoints checkpoints(options, scene);
+  RunResult start = start_of(scene);
+  Written written;
+  if (options.resume) {
+    checkpoints.load(scene, start, written);
+  } else {
+    io::make_folder(options.out);
+    checkpoints.remove();
+  }
+  Outputs outputs(options, scene, exports, written, start.frames);
   std::printf("%s", exports.left_out().c_str());
+  if (options.resume)
+    std::printf("resumed at %.6g s, frame %lld\n", scene.shown_time(), static_cast<long long>(start.frames));
   catch_signals();
   bool told = false;
-  const RunResult result = run(scene, scene.description.duration, [&](std::int64_t frame, double ms) {
+  const auto frame = [&](std::int64_t number, double ms) {
     outputs.add(scene, ms);
-    if (frame == 0 || told) return;
+    if (number == 0 || told) return;
     told = true;
     print_choices(scene);
-  });
+  };
+  const auto between = [&](const RunResult& result, bool last) {
+    if (checkpoints.due(scene, last)) checkpoints.save(scene, result, outputs.sync());
+  };
+  const RunResult result = run(scene, scene.description.duration, frame, between, std::move(start));
   if (!told) print_choices(scene);
   outputs.finish(scene);
+  const bool whole = result.exit_code() == kDone;
+  if (whole) checkpoints.remove();
   std::printf("%s", summary(result).c_str());
   if (!result.report.good()) std::fprintf(stderr, "hooke: %s\n", result.report.text().c_str());
   if (result.interrupted)
-    std::fprintf(stderr, "hooke: interrupted at %.6g s; what is finished is in %s\n", result.shown_time,
-                 options.out.c_str());
-  const bool whole = result.exit_code() == kDone;
+    std::fprintf(stderr, "hooke: interrupted at %.6g s; what is finished is in %s%s\n", result.shown_time,
+                 options.out.c_str(), options.checkpoint == 0.0 ? "" : ", and --resume goes on from there");
   if (options.estimate_error && whole) print_estimates(scene);
   if (options.verify && whole) print_verification(scene);
   return result.exit_code();

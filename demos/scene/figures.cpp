@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <limits>
+#include <span>
 
 namespace hooke::scene {
 
@@ -124,6 +126,37 @@ std::string CapeFigures::text() const {
   for (const auto& [time, speed] : settling_)
     out += format("  RMS speed in the half second to %.1f s after the last step: %.4f m/s\n", time - freeze_, speed);
   return out;
+}
+
+void CapeFigures::save(CheckpointWriter& out) const {
+  for (const double value :
+       {depth_, bare_depth_, pin_error_, depth_time_, bare_depth_time_, worst_time_, speed_squared_})
+    out.add(value);
+  out.add(worst_);
+  out.add(std::int64_t(speeds_));
+  out.add(std::uint64_t(strains_.size()));
+  out.add(strains_);
+  out.add(std::uint64_t(settling_.size()));
+  for (const auto& [time, speed] : settling_) {
+    out.add(time);
+    out.add(speed);
+  }
+}
+
+void CapeFigures::load(CheckpointReader& in) {
+  for (double* value :
+       {&depth_, &bare_depth_, &pin_error_, &depth_time_, &bare_depth_time_, &worst_time_, &speed_squared_})
+    *value = in.number<double>("figure");
+  worst_ = in.number<float>("worst strain");
+  speeds_ = Index(in.number<std::int64_t>("number of speeds", 0));
+  constexpr Index kMany = std::numeric_limits<Index>::max();
+  strains_.resize(std::size_t(in.count("number of strains", kMany, sizeof(float))));
+  in.fill("strains", std::span(strains_));
+  settling_.resize(std::size_t(in.count("number of half seconds", kMany, 16)));
+  for (auto& [time, speed] : settling_) {
+    time = in.number<double>("time");
+    speed = in.number<double>("speed");
+  }
 }
 
 }  // namespace hooke::scene

@@ -44,6 +44,10 @@ class CapeFigures {
   /// All of it, a line each.
   std::string text() const;
 
+  /// For checkpoints: what was measured so far.
+  void save(CheckpointWriter& out) const;
+  void load(CheckpointReader& in);
+
  private:
   std::size_t body_;
   std::string name_;

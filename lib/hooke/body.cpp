@@ -25,6 +25,16 @@ std::string StepReport::text() const {
 // Nothing is known to oscillate.
 double Body::stable_step(const Method& method) const { return largest_stable_step(method, 0, 0); }
 
+void Body::describe(Blueprint&) const {}
+
+void Body::save(CheckpointWriter&) const {
+  throw std::invalid_argument("body \"" + name_ + "\": its kind has no checkpoints");
+}
+
+void Body::load(CheckpointReader&) {
+  throw std::invalid_argument("body \"" + name_ + "\": its kind has no checkpoints");
+}
+
 Vec3 Body::displacement(Index point) const {
   check_index(point, size());
   return row(positions(), point) - row(start_positions(), point);

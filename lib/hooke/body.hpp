@@ -2,6 +2,7 @@
 // precision inside.
 #pragma once
 
+#include <hooke/checkpoint.hpp>
 #include <hooke/collider.hpp>
 #include <hooke/gang.hpp>
 #include <hooke/method.hpp>
@@ -131,6 +132,16 @@ class Body {
   virtual void take_back() = 0;
   /// Global damping: free velocities times `factor`.
   virtual void damp(double factor) = 0;
+
+  // Checkpoints, between frames. A body that adds state to a base calls the base's first, in each of the three.
+  /// What `save` leaves out because the program that builds the world gives it: settings, forces, functions.
+  virtual void describe(Blueprint& out) const;
+  /// Everything that changes while time goes on.
+  /// @throws std::invalid_argument where a kind of body cannot be saved, which is what this base does
+  virtual void save(CheckpointWriter& out) const;
+  /// Takes over what `save` wrote of a body of the same description; from here on every bit is as it would have
+  /// been there. May throw half-way: the world loads what was there before.
+  virtual void load(CheckpointReader& in);
 
  private:
   std::string name_;

@@ -40,6 +40,13 @@ class Clock {
 
   void count_tick() { ++ticks_; }
 
+  /// Goes to another time: that of a checkpoint.
+  /// @param ticks, remainder as they were told there, >= 0
+  void set(std::int64_t ticks, double remainder) {
+    ticks_ = ticks;
+    remainder_ = remainder;
+  }
+
  private:
   double tick_rate_;
   std::int64_t ticks_ = 0;

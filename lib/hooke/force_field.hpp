@@ -2,6 +2,7 @@
 // acceleration and belongs to the world. Springs and wind are in hooke::softbody.
 #pragma once
 
+#include <hooke/checkpoint.hpp>
 #include <hooke/stepper.hpp>
 #include <hooke/types.hpp>
 
@@ -45,6 +46,9 @@ class ForceField {
 
   /// A faster way to move points on which this field, gravity and pushes act alone, or null.
   virtual std::unique_ptr<Stepper<S>> stepper() const { return nullptr; }
+
+  /// Its settings, so that checkpoints know it again. Fields keep no state: what they are at t is a function of t.
+  virtual void describe(Blueprint&) const {}
 };
 
 /// Linear drag: F = -c v, c in N·s/m. Terminal speed m g / c.
@@ -58,6 +62,7 @@ class LinearDrag final : public ForceField<S> {
   void add_damping_times(const Points<S>& x, const Points<S>& v, const Points<S>& d, Points<S>& out) const override;
   typename ForceField<S>::Rates rate_bounds(const Points<S>& x, const Points<S>& v,
                                             const Values<S>& inverse_mass) const override;
+  void describe(Blueprint& out) const override { out.add("linear drag", double(coefficient_)); }
 
  private:
   S coefficient_;
@@ -74,6 +79,7 @@ class QuadraticDrag final : public ForceField<S> {
   void add_damping_times(const Points<S>& x, const Points<S>& v, const Points<S>& d, Points<S>& out) const override;
   typename ForceField<S>::Rates rate_bounds(const Points<S>& x, const Points<S>& v,
                                             const Values<S>& inverse_mass) const override;
+  void describe(Blueprint& out) const override { out.add("quadratic drag", double(coefficient_)); }
 
  private:
   S coefficient_;

@@ -38,6 +38,25 @@ SolveResult Integrator<S>::step(Dynamics<S>& dynamics, Points<S>& x, Points<S>& 
 }
 
 template <class S>
+void Integrator<S>::save(CheckpointWriter& out) const {
+  out.add(adapted_step_);
+  out.add(adapted_error_);
+  out.add(std::int64_t(adapted_steps_));
+  out.add(work_.evaluations);
+  out.add(work_.products);
+}
+
+template <class S>
+void Integrator<S>::load(CheckpointReader& in) {
+  restart();
+  adapted_step_ = in.number<double>("adapted step", 0);
+  adapted_error_ = in.number<double>("adapted error", 0);
+  adapted_steps_ = Index(in.number<std::int64_t>("adapted steps", 0));
+  work_.evaluations = in.number<std::int64_t>("evaluations", 0);
+  work_.products = in.number<std::int64_t>("products", 0);
+}
+
+template <class S>
 void Integrator<S>::evaluate(Dynamics<S>& dynamics, const Points<S>& x, const Points<S>& v, double t, Points<S>& a) {
   ++work_.evaluations;
   dynamics.acceleration(x, v, t, a);

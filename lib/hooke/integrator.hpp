@@ -2,6 +2,7 @@
 // constrains them is behind Dynamics; which method is a table from method.hpp.
 #pragma once
 
+#include <hooke/checkpoint.hpp>
 #include <hooke/method.hpp>
 #include <hooke/types.hpp>
 
@@ -89,6 +90,12 @@ class Integrator {
 
   /// Must be called when anything but this integrator changed x, v, or what forces depend on.
   void restart() { acceleration_known_ = false, increment_step_ = 0; }
+  /// As restart, and what error control has learnt is gone: for other points.
+  void forget() { restart(), adapted_step_ = 0, adapted_error_ = 1; }
+
+  /// What is kept by restart. Loading restarts.
+  void save(CheckpointWriter& out) const;
+  void load(CheckpointReader& in);
 
  private:
   SolveResult run(const Splitting&, Dynamics<S>&, Points<S>& x, Points<S>& v, double t, double h);

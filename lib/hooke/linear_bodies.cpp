@@ -226,6 +226,53 @@ StepReport LinearBodies<S>::advance(const Tick& tick) {
   return PointBody<S>::advance(tick);
 }
 
+template <class S>
+void LinearBodies<S>::describe(Blueprint& out) const {
+  PointBody<S>::describe(out);
+  out.add("rest_speed", rest_speed_);
+  CheckpointWriter bodies;
+  for (const LinearBody& body : bodies_) {
+    bodies.add(std::uint8_t(body.shape.index()));
+    if (const auto* ball = std::get_if<BallShape>(&body.shape))
+      bodies.add(ball->radius);
+    else
+      bodies.add(std::get<BoxShape>(body.shape).half_extent);
+    bodies.add(body.restitution);
+    bodies.add(body.collidable);
+  }
+  out.add_sum("linear bodies", bodies);
+}
+
+template <class S>
+void LinearBodies<S>::save(CheckpointWriter& out) const {
+  PointBody<S>::save(out);
+  out.begin("impacts");
+  out.add(std::uint64_t(impacts_.size()));
+  for (const Impact& impact : impacts_) {
+    out.add(impact.time);
+    out.add(std::int64_t(impact.body));
+    out.add(std::int64_t(impact.other));
+    out.add(impact.impulse);
+    out.add(impact.approach);
+  }
+  out.end();
+}
+
+template <class S>
+void LinearBodies<S>::load(CheckpointReader& in) {
+  PointBody<S>::load(in);
+  in.begin("impacts");
+  impacts_.resize(std::size_t(in.count("number of impacts", std::numeric_limits<Index>::max(), 64)));
+  for (Impact& impact : impacts_) {
+    impact.time = in.number<double>("time");
+    impact.body = Index(in.number<std::int64_t>("body", 0, this->size() - 1));
+    impact.other = Index(in.number<std::int64_t>("other", -1, this->size() - 1));
+    in.array("impulse", impact.impulse, 3);
+    impact.approach = in.number<double>("approach");
+  }
+  in.end();
+}
+
 template class LinearBodies<float>;
 template class LinearBodies<double>;
 

@@ -52,6 +52,9 @@ class LinearBodies final : public PointBody<S> {
   const std::vector<Impact>& impacts() const { return impacts_; }  ///< of the last tick, in order
 
   StepReport advance(const Tick& tick) override;
+  void describe(Blueprint& out) const override;
+  void save(CheckpointWriter& out) const override;
+  void load(CheckpointReader& in) override;
 
  protected:
   SolveResult substep(double t, double h) override;

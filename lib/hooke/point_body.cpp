@@ -473,6 +473,129 @@ void PointBody<S>::damp(double factor) {
     points_.velocity.col(k) *= (points_.inverse_mass > S(0)).select(Values<S>::Constant(size(), S(factor)), S(1));
 }
 
+// ---- Checkpoints
+
+template <class S>
+void PointBody<S>::describe(Blueprint& out) const {
+  out.add("precision", std::is_same_v<S, float> ? "float" : "double");
+  out.add("points", size());
+  CheckpointWriter mass;
+  mass.add(points_.mass);
+  out.add_sum("masses", mass);
+  out.add("method", settings_.method->name);
+  out.add("dt", settings_.dt);
+  out.add("thickness", settings_.thickness);
+  out.add("collides", settings_.collides);
+  out.add("max_substeps", settings_.max_substeps);
+  out.add("tolerance", settings_.tolerance);
+  out.add("number of force fields", Index(fields_.size()));
+  out.add("number of held force fields", Index(held_fields_.size()));
+  for (const auto* fields : {&fields_, &held_fields_})
+    for (const auto& field : *fields) field->describe(out);
+  out.add("stepper", stepper_ ? stepper_->precision() : "none");
+  out.add("number of pin motions", Index(driven_.size()));
+  for (const Driven& group : driven_) out.add("pins of a motion", Index(group.points.size()));
+}
+
+template <class S>
+void PointBody<S>::save(CheckpointWriter& out) const {
+  out.begin("points");
+  out.add(points_.origin);
+  for (const Points<S>* p : {&points_.position, &points_.velocity, &start_, &previous_position_, &previous_velocity_})
+    out.add(*p);
+  out.add(points_.inverse_mass);
+  out.end();
+
+  out.begin("pushes");
+  const auto add = [&](const std::vector<Push>& pushes) {
+    out.add(std::uint64_t(pushes.size()));
+    for (const auto& [point, force] : pushes) {
+      out.add(std::int64_t(point));
+      out.add(force);
+    }
+  };
+  add(pushed_);
+  out.add(std::uint64_t(bank_.size()));
+  for (const Banked& piece : bank_) {
+    out.add(piece.seconds);
+    add(piece.pushes);
+  }
+  out.end();
+
+  out.begin("pins");
+  for (const Driven& group : driven_)
+    for (const Index point : group.points) out.add(std::int64_t(point));
+  out.add(std::uint64_t(moving_.size()));
+  for (const Moving& pin : moving_) {
+    out.add(std::int64_t(pin.point));
+    out.add(pin.from);
+    out.add(pin.to);
+  }
+  out.add(frame_start_);
+  out.add(frame_end_);
+  out.end();
+
+  out.begin("steps");
+  out.add(std::int64_t(substeps_));
+  out.add(wanted_dt_);
+  out.add(last_estimate_);
+  integrator_.save(out);
+  out.end();
+}
+
+template <class S>
+void PointBody<S>::load(CheckpointReader& in) {
+  const Index n = size();
+  in.begin("points");
+  in.array("origin", points_.origin, 3);
+  in.array("position", points_.position, n);
+  in.array("velocity", points_.velocity, n);
+  in.array("start", start_, n);
+  in.array("previous position", previous_position_, n);
+  in.array("previous velocity", previous_velocity_, n);
+  in.array("inverse mass", points_.inverse_mass, n);
+  in.require((points_.inverse_mass >= S(0)).all(), "inverse mass", "must not be negative");
+  in.end();
+
+  in.begin("pushes");
+  const auto get = [&](std::vector<Push>& pushes) {
+    const Index count = in.count("number of pushes", std::numeric_limits<Index>::max(), 40);
+    pushes.clear();
+    for (Index i = 0; i < count; ++i) {
+      Push& push = pushes.emplace_back();
+      push.first = Index(in.number<std::int64_t>("pushed point", 0, n - 1));
+      in.array("force", push.second, 3);
+    }
+  };
+  get(pushed_);
+  bank_.resize(std::size_t(in.count("number of banked frames", std::numeric_limits<Index>::max(), 16)));
+  for (Banked& piece : bank_) {
+    piece.seconds = in.number<double>("banked seconds", 0);
+    get(piece.pushes);
+  }
+  in.end();
+
+  in.begin("pins");
+  for (Driven& group : driven_)
+    for (Index& point : group.points) point = Index(in.number<std::int64_t>("driven point", -1, n - 1));
+  moving_.resize(std::size_t(in.count("number of moving pins", n, 72)));
+  for (Moving& pin : moving_) {
+    pin.point = Index(in.number<std::int64_t>("moving pin", 0, n - 1));
+    in.array("from", pin.from, 3);
+    in.array("to", pin.to, 3);
+  }
+  frame_start_ = in.number<double>("frame's start");
+  frame_end_ = in.number<double>("frame's end");
+  in.end();
+
+  in.begin("steps");
+  substeps_ = Index(in.number<std::int64_t>("substeps", 0, settings_.max_substeps));
+  wanted_dt_ = in.number<double>("wanted step", 0, std::numeric_limits<double>::infinity());
+  last_estimate_ = in.number<double>("last estimate", -1);
+  integrator_.load(in);
+  in.end();
+}
+
 template class PointBody<float>;
 template class PointBody<double>;
 

@@ -73,6 +73,9 @@ class PointBody : public Body, protected Dynamics<S> {
   StepReport advance(const Tick& tick) override;
   void take_back() override;
   void damp(double factor) override;
+  void describe(Blueprint& out) const override;
+  void save(CheckpointWriter& out) const override;
+  void load(CheckpointReader& in) override;
 
  protected:
   // Dynamics: the equations of motion of these points.

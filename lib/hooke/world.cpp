@@ -1,6 +1,9 @@
 #include <hooke/world.hpp>
 
+#include <hooke/error.hpp>
+
 #include <cmath>
+#include <ostream>
 #include <stdexcept>
 
 namespace hooke {
@@ -125,6 +128,140 @@ Vec3 World::displacement() const {
     mass += body->total_mass();
   }
   return mass > 0 ? Vec3(sum / mass) : sum;
+}
+
+// ---- Checkpoints
+
+namespace {
+
+// Grids are known by where they are and what they say there.
+void add_shape(CheckpointWriter& out, const Shape& shape) {
+  out.add(std::uint8_t(shape.index()));
+  if (const auto* plane = std::get_if<HalfSpace>(&shape)) {
+    out.add(plane->normal), out.add(plane->offset);
+  } else if (const auto* sphere = std::get_if<Sphere>(&shape)) {
+    out.add(sphere->center), out.add(sphere->radius);
+  } else if (const auto* capsule = std::get_if<Capsule>(&shape)) {
+    out.add(capsule->a), out.add(capsule->b), out.add(capsule->radius);
+  } else if (const auto* box = std::get_if<Box>(&shape)) {
+    out.add(box->center), out.add(box->half_extent), out.add(box->axes);
+  } else if (const auto* set = std::get_if<LevelSet>(&shape)) {
+    out.add(set->offset);
+    for (const Vec3& place : {Vec3(0, 0, 0), Vec3(0.1, 0.2, 0.3)}) out.add(signed_distance(*set, set->offset + place));
+  }
+}
+
+}  // namespace
+
+Blueprint World::blueprint() const {
+  Blueprint out;
+  out.add("tick_rate", clock_.tick_rate());
+  out.add("number of colliders", Index(colliders_.size()));
+  for (const Collider& collider : colliders_) {
+    const std::string what = "collider \"" + collider.name + "\"";
+    CheckpointWriter shapes;
+    for (const Shape& shape : collider.shapes)
+      if (collider.motion)
+        shapes.add(std::uint8_t(shape.index()));
+      else
+        add_shape(shapes, shape);
+    out.add_sum(what + ": shapes", shapes);
+    out.add(what + ": friction", collider.friction);
+    out.add(what + ": restitution", collider.restitution);
+    out.add(what + ": has motion", bool(collider.motion));
+    out.add(what + ": has distance", bool(collider.distance));
+  }
+  out.add("number of bodies", Index(bodies_.size()));
+  for (const auto& body : bodies_) out.add("body", body->name());
+  return out;
+}
+
+void World::save_state(CheckpointWriter& out) const {
+  out.begin("clock");
+  out.add(clock_.ticks());
+  out.add(clock_.remainder());
+  out.add(gravity_);
+  out.add(gravity_on_);
+  out.add(damping_);
+  out.end();
+  for (const auto& body : bodies_) {
+    out.begin("body " + body->name());
+    out.add(body->has_physics());
+    body->save(out);
+    out.end();
+  }
+}
+
+void World::load_state(CheckpointReader& in) {
+  in.begin("clock");
+  // Ticks that a double can count.
+  const auto ticks = in.number<std::int64_t>("ticks", 0, std::int64_t(1) << 53);
+  clock_.set(ticks, in.number<double>("remainder", 0, clock_.tick()));
+  in.array("gravity", gravity_, 3);
+  gravity_on_ = in.number<bool>("gravity is on");
+  damping_ = in.number<double>("damping", 0, 1);
+  in.require(damping_ < 1, "damping", "must be below 1");
+  in.end();
+  for (const auto& body : bodies_) {
+    in.begin("body " + body->name());
+    body->set_physics(in.number<bool>("has physics"));
+    body->load(in);
+    in.end();
+  }
+}
+
+void World::save(CheckpointWriter& out) const {
+  out.begin("world");
+  out.begin("settings");
+  blueprint().save(out);
+  for (const auto& body : bodies_) {
+    Blueprint settings;
+    body->describe(settings);
+    out.begin("body " + body->name());
+    settings.save(out);
+    out.end();
+  }
+  out.end();
+  save_state(out);
+  out.end();
+}
+
+void World::load(CheckpointReader& in) {
+  in.begin("world");
+  in.begin("settings");
+  blueprint().check(in);
+  for (const auto& body : bodies_) {
+    Blueprint settings;
+    body->describe(settings);
+    in.begin("body " + body->name());
+    settings.check(in);
+    in.end();
+  }
+  in.end();
+  CheckpointWriter before;
+  save_state(before);
+  try {
+    load_state(in);
+    in.end();
+  } catch (...) {
+    CheckpointReader back(before.contents(), "the world before");
+    load_state(back);
+    throw;
+  }
+}
+
+void World::save(std::ostream& file) const {
+  CheckpointWriter out;
+  save(out);
+  const std::string bytes = out.file();
+  file.write(bytes.data(), std::streamsize(bytes.size()));
+  if (!file.flush()) throw OutputError("checkpoint: cannot write " + std::to_string(bytes.size()) + " bytes");
+}
+
+void World::load(std::istream& file, const std::string& name) {
+  CheckpointReader in = CheckpointReader::read(file, name);
+  load(in);
+  in.finish();
 }
 
 }  // namespace hooke

@@ -5,6 +5,7 @@
 #include <hooke/body.hpp>
 #include <hooke/clock.hpp>
 
+#include <iosfwd>
 #include <memory>
 
 namespace hooke {
@@ -69,8 +70,25 @@ class World {
   Vec3 momentum() const;
   Vec3 displacement() const;  ///< of the centre of mass of all bodies [m]
 
+  // Checkpoints, between two updates; docs/checkpoints.md.
+  /// Writes everything that changes while time goes on: clock, gravity, damping, bodies. Forces, colliders, functions
+  /// and settings are left to the program that builds the world again. Cost: a copy of the state.
+  /// @throws std::invalid_argument for bodies of a kind that has no checkpoints, hooke::OutputError
+  void save(std::ostream& file) const;
+  void save(CheckpointWriter& out) const;
+  /// Takes over what `save` wrote of a world that was built in the same way; whatever comes after has the same bits as
+  /// it would have had there, at any number of threads. Where this throws, the world is as it was.
+  /// @param name what errors call the file
+  /// @throws hooke::Error naming file, section, rule and value: not a checkpoint, another version, truncated,
+  ///         damaged, or of a world that differs in bodies, settings or colliders
+  void load(std::istream& file, const std::string& name = "checkpoint");
+  void load(CheckpointReader& in);
+
  private:
   StepReport step();
+  Blueprint blueprint() const;
+  void save_state(CheckpointWriter& out) const;
+  void load_state(CheckpointReader& in);
   void for_each_body(const std::function<void(Body&, std::size_t)>& work);
 
   Clock clock_;

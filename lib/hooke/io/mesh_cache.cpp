@@ -32,6 +32,8 @@ class Sequence final : public MeshCache {
     writer_(folder_ / (name_ + "." + number + extension_), vertices, triangles_);
     ++count_;
   }
+  void resume(Index count, Index size) override { count_ = count, size_ = size; }
+  void sync() override {}
   void finish() override {}
 
  private:
@@ -46,7 +48,7 @@ class Sequence final : public MeshCache {
 // every point, sample after sample.
 class PointCache final : public MeshCache {
  public:
-  static constexpr std::int64_t kCountAt = 28;
+  static constexpr std::int64_t kCountAt = 28, kHeader = 32, kPoint = 12;  // bytes
 
   PointCache(const std::filesystem::path& folder, std::string_view name, std::vector<Triangle> triangles)
       : path_(folder / (std::string(name) + ".pc2")),
@@ -63,6 +65,18 @@ class PointCache final : public MeshCache {
     count.add(std::uint32_t(++count_));
     file_->rewrite(kCountAt, count);
     file_->flush();
+  }
+  void resume(Index count, Index size) override {
+    if (count == 0) return;
+    size_ = size;
+    count_ = std::uint32_t(count);
+    file_.emplace(path_, OutputFile::Leftover::Keep, kHeader + count * size * kPoint);
+    Bytes bytes;
+    bytes.add(count_);
+    file_->rewrite(kCountAt, bytes);
+  }
+  void sync() override {
+    if (file_) file_->sync();
   }
   void finish() override {
     if (file_) file_->commit();

@@ -18,6 +18,11 @@ class MeshCache {
   /// @param vertices [m], shape (n, 3), n as in the first call, else std::invalid_argument
   /// @throws hooke::OutputError
   virtual void add(const Points<double>& vertices) = 0;
+  /// Goes on after the first `count` samples of `size` vertices that an earlier run added; to be called first.
+  /// @throws hooke::Error where they are not there
+  virtual void resume(Index count, Index size) = 0;
+  /// Has everything added so far written to the disk.
+  virtual void sync() = 0;
   /// Completes the files. add() must not be called any more.
   virtual void finish() = 0;
 };

@@ -2,6 +2,8 @@
 
 #include <hooke/error.hpp>
 
+#include <unistd.h>
+
 #include <cerrno>
 #include <charconv>
 #include <cstring>
@@ -35,6 +37,24 @@ OutputFile::OutputFile(std::filesystem::path path, Leftover leftover)
     : path_(std::move(path)), part_(part_name(path_)), leftover_(leftover) {
   file_ = std::fopen(part_.c_str(), "wb");
   if (!file_) fail("open", errno);
+}
+
+OutputFile::OutputFile(std::filesystem::path path, Leftover leftover, std::int64_t keep)
+    : path_(std::move(path)), part_(part_name(path_)), leftover_(leftover) {
+  std::error_code error;
+  const std::filesystem::path from = std::filesystem::exists(part_, error) ? part_ : path_;
+  const std::uintmax_t there = std::filesystem::file_size(from, error);
+  if (error) throw Error(from.string() + ": cannot be continued: " + error.message());
+  if (there < std::uintmax_t(keep))
+    throw Error(from.string() + ": cannot be continued after " + std::to_string(keep) + " bytes, it has only " +
+                std::to_string(there));
+  if (from == path_) std::filesystem::rename(path_, part_, error);
+  if (error) fail("rename", error.value());
+  std::filesystem::resize_file(part_, std::uintmax_t(keep), error);
+  if (error) fail("cut", error.value());
+  file_ = std::fopen(part_.c_str(), "r+b");
+  if (!file_) fail("open", errno);
+  if (std::fseek(file_, 0, SEEK_END) != 0) fail("seek", errno);
 }
 
 OutputFile::~OutputFile() {
@@ -72,6 +92,18 @@ void OutputFile::rewrite(std::int64_t offset, std::span<const std::byte> bytes) 
 
 void OutputFile::flush() {
   if (std::fflush(file_) != 0) fail("write", errno);
+}
+
+void OutputFile::sync() {
+  flush();
+  // Pipes and the like have nothing to write to.
+  if (::fsync(::fileno(file_)) != 0 && errno != EINVAL && errno != EROFS) fail("write", errno);
+}
+
+std::int64_t OutputFile::size() {
+  const long at = std::ftell(file_);
+  if (at < 0) fail("tell the size", errno);
+  return at;
 }
 
 void OutputFile::commit() {

@@ -32,6 +32,10 @@ class OutputFile {
   };
 
   explicit OutputFile(std::filesystem::path path, Leftover leftover = Leftover::Remove);
+  /// Goes on after the first `keep` bytes of what another run left under the temporary name or, if there is none,
+  /// under the file's own; the rest is cut off.
+  /// @throws hooke::Error where neither is there or has so many bytes
+  OutputFile(std::filesystem::path path, Leftover leftover, std::int64_t keep);
   ~OutputFile();
   OutputFile(OutputFile&& other) noexcept;
   OutputFile& operator=(OutputFile&&) = delete;
@@ -48,6 +52,9 @@ class OutputFile {
 
   /// Hands everything written so far to the system.
   void flush();
+  /// Has the system write it to the disk.
+  void sync();
+  std::int64_t size();  ///< [bytes] written so far
 
   /// Closes the file and renames it to path(). Nothing may be written afterwards.
   void commit();

@@ -30,8 +30,11 @@ void StateTable::add(std::string_view body, const Points<double>& x, const Point
   }
 }
 
-NumberTable::NumberTable(const std::filesystem::path& path, std::vector<std::string> columns)
-    : file_(path, OutputFile::Leftover::Keep), columns_(columns.size()) {
+NumberTable::NumberTable(const std::filesystem::path& path, const std::vector<std::string>& columns, std::int64_t keep)
+    : file_(keep < 0 ? OutputFile(path, OutputFile::Leftover::Keep)
+                     : OutputFile(path, OutputFile::Leftover::Keep, keep)),
+      columns_(columns.size()) {
+  if (keep >= 0) return;
   for (std::size_t i = 0; i < columns.size(); ++i) {
     if (i) file_.write(",");
     file_.write(csv_field(columns[i]));
@@ -50,17 +53,19 @@ void NumberTable::add(std::span<const double> row) {
   file_.flush();
 }
 
-DiagnosticsTable::DiagnosticsTable(const std::filesystem::path& path)
-    : table_(path, {"time", "kinetic", "gravitational", "elastic", "total", "momentum_x", "momentum_y", "momentum_z",
-                    "worst_stretch"}) {}
+DiagnosticsTable::DiagnosticsTable(const std::filesystem::path& path, std::int64_t keep)
+    : table_(path,
+             {"time", "kinetic", "gravitational", "elastic", "total", "momentum_x", "momentum_y", "momentum_z",
+              "worst_stretch"},
+             keep) {}
 
 void DiagnosticsTable::add(const Diagnostics& f) {
   table_.add({f.time, f.kinetic, f.gravitational, f.elastic, f.kinetic + f.gravitational + f.elastic, f.momentum.x(),
               f.momentum.y(), f.momentum.z(), f.worst_stretch});
 }
 
-TimingsTable::TimingsTable(const std::filesystem::path& path)
-    : table_(path, {"time", "simulate_ms", "measure_ms", "write_ms"}) {}
+TimingsTable::TimingsTable(const std::filesystem::path& path, std::int64_t keep)
+    : table_(path, {"time", "simulate_ms", "measure_ms", "write_ms"}, keep) {}
 
 void TimingsTable::add(const Timings& f) { table_.add({f.time, f.simulate, f.measure, f.write}); }
 

@@ -31,11 +31,14 @@ class StateTable {
 /// Rows of numbers under a header; what was written stays readable when a run is cut off.
 class NumberTable {
  public:
-  NumberTable(const std::filesystem::path& path, std::vector<std::string> columns);
+  /// @param keep bytes of an earlier run's table after which this one goes on; < 0: a new one
+  NumberTable(const std::filesystem::path& path, const std::vector<std::string>& columns, std::int64_t keep = -1);
   /// @param row as many numbers as there are columns, else std::invalid_argument
   void add(std::span<const double> row);
   void add(std::initializer_list<double> row) { add(std::span(row.begin(), row.size())); }
   void finish() { file_.commit(); }
+  /// Puts everything on the disk. @return its size [bytes], from which another run can go on
+  std::int64_t sync() { return file_.sync(), file_.size(); }
 
  private:
   OutputFile file_;
@@ -53,9 +56,10 @@ struct Diagnostics {
 /// time,kinetic,gravitational,elastic,total,momentum_x,momentum_y,momentum_z,worst_stretch
 class DiagnosticsTable {
  public:
-  explicit DiagnosticsTable(const std::filesystem::path& path);
+  explicit DiagnosticsTable(const std::filesystem::path& path, std::int64_t keep = -1);
   void add(const Diagnostics& frame);
   void finish() { table_.finish(); }
+  std::int64_t sync() { return table_.sync(); }
 
  private:
   NumberTable table_;
@@ -70,9 +74,10 @@ struct Timings {
 /// time,simulate_ms,measure_ms,write_ms
 class TimingsTable {
  public:
-  explicit TimingsTable(const std::filesystem::path& path);
+  explicit TimingsTable(const std::filesystem::path& path, std::int64_t keep = -1);
   void add(const Timings& frame);
   void finish() { table_.finish(); }
+  std::int64_t sync() { return table_.sync(); }
 
  private:
   NumberTable table_;

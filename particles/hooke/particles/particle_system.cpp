@@ -212,7 +212,7 @@ ParticleSystem<S>::ParticleSystem(ParticleSettings settings) : Body(settings.nam
   birth_place_.setZero(n, 3);
   slots_.resize(std::size_t(n));
   for (Index i = n; i-- > 0;) free_.push_back(std::uint32_t(i));
-  for (Index i = 0; i < settings_.trail; ++i) trail_.emplace_back(n, 3);
+  for (Index i = 0; i < settings_.trail; ++i) trail_.emplace_back(Points<float>::Zero(n, 3));
   trail_length_.assign(settings_.trail > 0 ? std::size_t(n) : 0, 0);
   // Room for what comes and goes in a tick.
   const std::size_t events = 256 + std::size_t(n) / 8;
@@ -580,7 +580,7 @@ void ParticleSystem<S>::integrate(Tile<S>& tile, Index first, Plan& plan, Worker
     std::copy_n(tile.x[k], tile.count, w.x.col(k).data());
     std::copy_n(tile.v[k], tile.count, w.v.col(k).data());
   }
-  w.integrator->restart();
+  w.integrator->forget();  // what another tile has taught it, which threads take in any order
   for (int s = 0; s < plan.steps; ++s) {
     contact.step = s;
     if (plan.exact)
@@ -1201,6 +1201,256 @@ MotionFacts ParticleSystem<S>::motion_facts() const {
 template <class S>
 void ParticleSystem<S>::damp(double factor) {
   velocity_.topRows(count_) *= S(factor);
+}
+
+// ---- Checkpoints
+
+namespace {
+
+void add_range(CheckpointWriter& out, const Range& range) {
+  out.add(range.least);
+  out.add(range.most);
+}
+
+}  // namespace
+
+template <class S>
+void ParticleSystem<S>::describe(Blueprint& out) const {
+  const ParticleSettings& s = settings_;
+  out.add("precision", std::is_same_v<S, float> ? "float" : "double");
+  out.add("method", s.method->name);
+  out.add("dt", s.dt);
+  out.add("tolerance", s.tolerance);
+  out.add("capacity", s.capacity);
+  out.add("tile", s.tile);
+  out.add("trail", s.trail);
+  out.add("prewarm", s.prewarm);
+  out.add("keeps_previous", s.keeps_previous);
+  CheckpointWriter rules;
+  rules.add(s.origin);
+  for (const double value : {s.radius, s.restitution, s.rest_speed}) rules.add(value);
+  rules.add(std::int32_t(s.at_capacity));
+  for (const bool value : {s.collides, s.exact_impacts, s.dies_on_impact}) rules.add(value);
+  rules.add(s.seed);
+  out.add_sum("contact rules, capacity rule, origin and seed", rules);
+  out.add("number of forces", Index(forces_.size()));
+  out.add("number of emitters", Index(emitters_.size()));
+  CheckpointWriter emitters;
+  for (const Emitter& emitter : emitters_) {
+    const EmitterSettings& e = emitter.settings();
+    emitters.add(std::uint8_t(e.source.index()));
+    emitters.add(e.position), emitters.add(e.axis);
+    for (const double value : {e.spread, e.start, e.stop, e.inherit}) emitters.add(value);
+    for (const Range& range : {e.speed, e.lifetime, e.mass, e.size}) add_range(emitters, range);
+    for (const Burst& burst : e.bursts)
+      emitters.add(burst.time), emitters.add(std::int64_t(burst.count)), emitters.add(burst.period);
+    emitters.add(e.along_normal), emitters.add(bool(e.path));
+    emitters.add(std::int32_t(e.kind)), emitters.add(e.seed);
+  }
+  out.add_sum("emitters", emitters);
+  out.add("number of sub-emitters", Index(sub_emitters_.size()));
+  CheckpointWriter subs;
+  for (const SubEmitterSettings& sub : sub_emitters_) {
+    subs.add(std::uint8_t(sub.on)), subs.add(std::int32_t(sub.parent_kind)), subs.add(std::int32_t(sub.kind));
+    for (const double value : {sub.probability, sub.least_impact, sub.spread, sub.inherit, sub.mass}) subs.add(value);
+    for (const Range& range : {sub.count, sub.speed, sub.lifetime, sub.size}) add_range(subs, range);
+    subs.add(sub.axis), subs.add(sub.seed);
+  }
+  out.add_sum("sub-emitters", subs);
+}
+
+template <class S>
+void ParticleSystem<S>::save(CheckpointWriter& out) const {
+  const auto rows = [&](const Points<S>& p) { out.add(Points<S>(p.topRows(count_))); };
+  const auto values = [&](const Values<S>& v) { out.add(Values<S>(v.head(count_))); };
+  const auto list = [&](const auto& v) { out.add(std::span(v.data(), std::size_t(count_))); };
+  const bool ages = remaining_.size() > 0;
+  out.begin("particles");
+  out.add(std::uint64_t(count_));
+  rows(position_), rows(velocity_);
+  if (settings_.keeps_previous) rows(previous_position_), rows(previous_velocity_);
+  out.add(ages);
+  if (ages) values(remaining_);
+  if (ages && settings_.keeps_previous) values(previous_remaining_);
+  out.add(same_mass_);
+  out.add(has_mass_);
+  if (has_mass_) values(inverse_mass_);
+  list(lifetime_), list(size_), list(serial_), list(slot_), list(kind_);
+  out.add(Points<float>(birth_place_.topRows(count_)));
+  out.end();
+
+  out.begin("trails");
+  out.add(std::int64_t(trail_head_));
+  for (const Points<float>& places : trail_) out.add(Points<float>(places.topRows(count_)));
+  if (settings_.trail > 0) list(trail_length_);
+  out.end();
+
+  out.begin("handles");
+  for (const Slot& slot : slots_) out.add(slot.generation);
+  out.add(free_);
+  out.end();
+
+  out.begin("counts");
+  out.add(next_serial_);
+  for (const std::int64_t value : {counts_.born, counts_.died, counts_.refused, counts_.displaced, counts_.impacts})
+    out.add(value);
+  out.add(started_);
+  out.add(std::int32_t(steps_));
+  out.add(evaluations_);
+  out.end();
+
+  out.begin("events");
+  out.add(std::uint64_t(early_.size()));
+  for (const Event& event : early_) {
+    out.add(std::uint8_t(event.on));
+    out.add(std::int64_t(event.particle));
+    out.add(std::int32_t(event.order));
+    out.add(event.time);
+    out.add(event.serial);
+    out.add(std::int32_t(event.kind));
+    for (const Vec3* value : {&event.position, &event.velocity, &event.normal}) out.add(*value);
+    out.add(event.speed);
+  }
+  out.end();
+
+  out.begin("pushes");
+  const auto add = [&](const std::vector<Push>& pushes) {
+    out.add(std::uint64_t(pushes.size()));
+    for (const Push& push : pushes) {
+      out.add(push.who.slot);
+      out.add(push.who.generation);
+      out.add(push.force);
+    }
+  };
+  add(pushed_);
+  out.add(std::uint64_t(bank_.size()));
+  for (const Banked& piece : bank_) {
+    out.add(piece.seconds);
+    add(piece.pushes);
+  }
+  out.end();
+}
+
+template <class S>
+void ParticleSystem<S>::load(CheckpointReader& in) {
+  constexpr Index kMany = std::numeric_limits<Index>::max();
+  in.begin("particles");
+  count_ = 0;
+  const Index n = in.count("number of particles", settings_.capacity);
+  Points<S> rows;
+  Values<S> values;
+  const auto read_rows = [&](const char* what, Points<S>& to) {
+    in.array(what, rows, n);
+    to.setZero();
+    to.topRows(n) = rows;
+  };
+  const auto read_values = [&](const char* what, Values<S>& to) {
+    in.array(what, values, n);
+    to.head(n) = values;
+  };
+  const auto list = [&](const char* what, auto& to) { in.fill(what, std::span(to.data(), std::size_t(n))); };
+  read_rows("position", position_);
+  read_rows("velocity", velocity_);
+  if (settings_.keeps_previous) {
+    read_rows("previous position", previous_position_);
+    read_rows("previous velocity", previous_velocity_);
+  }
+  remaining_.resize(0), previous_remaining_.resize(0);
+  if (in.number<bool>("somebody ages")) {
+    start_ageing();
+    read_values("remaining life", remaining_);
+    if (settings_.keeps_previous) read_values("previous remaining life", previous_remaining_);
+  }
+  same_mass_ = in.number<double>("common mass", std::numeric_limits<double>::min());
+  has_mass_ = false;
+  inverse_mass_.resize(0);
+  if (in.number<bool>("masses differ")) {
+    start_weighing();
+    read_values("inverse mass", inverse_mass_);
+    in.require((inverse_mass_.head(n) > S(0)).all(), "inverse mass", "must be positive");
+  }
+  list("lifetime", lifetime_), list("size", size_), list("serial", serial_), list("slot", slot_), list("kind", kind_);
+  for (Index i = 0; i < n; ++i) {
+    in.require(lifetime_[std::size_t(i)] > 0, "lifetime", "must be positive");
+    in.require(std::isfinite(size_[std::size_t(i)]), "size", "must be finite");
+  }
+  Points<float> places;
+  in.array("birth place", places, n);
+  birth_place_.topRows(n) = places;
+  in.end();
+
+  in.begin("trails");
+  trail_head_ = Index(in.number<std::int64_t>("newest", 0, std::max<Index>(settings_.trail, 1) - 1));
+  for (Points<float>& trail : trail_) {
+    in.array("place", places, n);
+    trail.topRows(n) = places;
+  }
+  if (settings_.trail > 0) list("length", trail_length_);
+  for (Index i = 0; settings_.trail > 0 && i < n; ++i)
+    in.require(trail_length_[std::size_t(i)] <= settings_.trail, "length", "must not exceed the setting trail");
+  in.end();
+
+  in.begin("handles");
+  for (Slot& slot : slots_) slot = {-1, in.number<std::uint32_t>("generation")};
+  free_.resize(std::size_t(settings_.capacity - n));
+  in.fill("free slots", std::span(free_));
+  std::vector<bool> taken(slots_.size(), false);
+  const auto take = [&](std::uint32_t slot) {
+    in.require(slot < taken.size() && !taken[slot], "slot", "must be below the capacity and taken once");
+    taken[slot] = true;
+  };
+  for (const std::uint32_t slot : free_) take(slot);
+  for (Index i = 0; i < n; ++i) {
+    const std::uint32_t slot = slot_[std::size_t(i)];
+    take(slot);
+    slots_[slot].index = i;
+  }
+  in.end();
+
+  in.begin("counts");
+  next_serial_ = in.number<std::uint64_t>("next serial");
+  for (std::int64_t* value : {&counts_.born, &counts_.died, &counts_.refused, &counts_.displaced, &counts_.impacts})
+    *value = in.number<std::int64_t>("count", 0, std::int64_t(1) << 62);
+  started_ = in.number<bool>("started");
+  steps_ = in.number<std::int32_t>("steps", 0);
+  evaluations_ = in.number<std::int64_t>("evaluations", 0, std::int64_t(1) << 62);
+  in.end();
+
+  in.begin("events");
+  early_.resize(std::size_t(in.count("number of events", kMany, 97)));
+  for (Event& event : early_) {
+    event.on = SubEmitterSettings::On(in.number<std::uint8_t>("kind of event", 0, 2));
+    event.particle = Index(in.number<std::int64_t>("particle", 0, n - 1));
+    event.order = in.number<std::int32_t>("order", 0);
+    event.time = in.number<double>("time");
+    event.serial = in.number<std::uint64_t>("serial");
+    event.kind = in.number<std::int32_t>("kind", 0, 255);
+    for (Vec3* value : {&event.position, &event.velocity, &event.normal}) in.array("event", *value, 3);
+    event.speed = in.number<double>("speed");
+  }
+  in.end();
+
+  in.begin("pushes");
+  const auto get = [&](std::vector<Push>& pushes) {
+    pushes.resize(std::size_t(in.count("number of pushes", kMany, 40)));
+    for (Push& push : pushes) {
+      push.who.slot = in.number<std::uint32_t>("slot");
+      push.who.generation = in.number<std::uint32_t>("generation");
+      in.array("force", push.force, 3);
+    }
+  };
+  get(pushed_);
+  bank_.resize(std::size_t(in.count("number of banked frames", kMany, 16)));
+  for (Banked& piece : bank_) {
+    piece.seconds = in.number<double>("banked seconds", 0);
+    get(piece.pushes);
+  }
+  in.end();
+
+  count_ = births_begin_ = n;
+  removed_.clear();
+  previous_counts_ = counts_;
+  previous_serial_ = next_serial_;
 }
 
 template class ParticleSystem<float>;

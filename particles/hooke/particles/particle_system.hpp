@@ -125,6 +125,9 @@ class ParticleSystem final : public Body {
   StepReport advance(const Tick& tick) override;
   void take_back() override;
   void damp(double factor) override;
+  void describe(Blueprint& out) const override;
+  void save(CheckpointWriter& out) const override;
+  void load(CheckpointReader& in) override;
 
  private:
   struct Particle;  // one particle's share of all arrays

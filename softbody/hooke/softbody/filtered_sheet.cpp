@@ -145,12 +145,6 @@ void FilteredSheet<S>::find_held() {
   }
   special_sums_.assign(special_rows_.size() * std::size_t(3 * stride_), S(0));
   special_place_.resize(Index(specials_.size()), 3);
-  if (this->prescribes()) {
-    const Index n = points_.size();
-    const bool first = place_x_.rows() != n;
-    place_x_.resize(n, 3), place_v_.resize(n, 3), jump_.resize(n, 3);
-    if (first) pin_velocity_ = points_.velocity;
-  }
 }
 
 template <class S>
@@ -180,10 +174,16 @@ void FilteredSheet<S>::prepare(double h, bool contacts) {
   const double plain =
       kPlainShare * largest_stable_step(velocity_verlet(), std::sqrt(rates.omega_squared), rates.gamma);
   filtered_ = h > plain;
+  factor();
+}
+
+// The filter of a step of h_.
+template <class S>
+void FilteredSheet<S>::factor() {
   double a_x = 0, a_y = 0;
   if (filtered_) {
-    const auto stiffness = plan_.line_stiffness(h);
-    const double share = (contacts ? kShareWithContacts : kShare) * h * h / 4;
+    const auto stiffness = plan_.line_stiffness(h_);
+    const double share = (contacts_ ? kShareWithContacts : kShare) * h_ * h_ / 4;
     a_x = share * stiffness.x, a_y = share * stiffness.y;
   }
   along_rows_.emplace(plan_.mass_model.column, held_column_, a_x);
@@ -229,6 +229,9 @@ void FilteredSheet<S>::meet_pins(double t, double h) {
       special_place_.row(Index(i)) = points_.position.row(specials_[i].point);
     return;
   }
+  const Index n = points_.size();
+  place_x_.resize(n, 3), place_v_.resize(n, 3), jump_.resize(n, 3);
+  if (pin_velocity_.rows() != n) pin_velocity_ = points_.velocity;
   for (const Index pin : pins_) place_x_.row(pin) = points_.position.row(pin), place_v_.row(pin) = S(0);
   this->prescribe(t, points_.position, t + h, place_x_, place_v_);
   for (const Index pin : pins_) jump_.row(pin) = place_v_.row(pin) - pin_velocity_.row(pin);
@@ -594,6 +597,53 @@ template <class S>
 void FilteredSheet<S>::take_back() {
   Base::take_back();
   known_ = false;
+}
+
+template <class S>
+void FilteredSheet<S>::describe(Blueprint& out) const {
+  Base::describe(out);
+  field_.describe(out);
+  out.add("stiffness scale", plan_.stiffness_scale);
+}
+
+// The filter is made again from what it was made of; whether there is one was decided by a state that is gone.
+template <class S>
+void FilteredSheet<S>::save(CheckpointWriter& out) const {
+  Base::save(out);
+  out.begin("filter");
+  out.add(stale_);
+  out.add(h_);
+  out.add(contacts_);
+  out.add(filtered_);
+  out.add(evaluations_);
+  out.add(pin_velocity_.rows() > 0);
+  if (pin_velocity_.rows() > 0) out.add(pin_velocity_);
+  out.add(known_);
+  out.add(known_gravity_);
+  if (known_) out.add(std::span<const S>(z_.data(), std::size_t(3 * plane_)));
+  out.end();
+}
+
+template <class S>
+void FilteredSheet<S>::load(CheckpointReader& in) {
+  Base::load(in);
+  in.begin("filter");
+  stale_ = in.number<bool>("pins have changed");
+  h_ = in.number<double>("step", 0);
+  contacts_ = in.number<bool>("contacts");
+  filtered_ = in.number<bool>("filtered");
+  evaluations_ = in.number<std::int64_t>("evaluations", 0);
+  in.require(stale_ || h_ > 0, "step", "must be positive");
+  if (!stale_) {
+    find_held();
+    factor();
+  }
+  pin_velocity_.resize(0, 3);
+  if (in.number<bool>("pins have moved")) in.array("pin velocity", pin_velocity_, points_.size());
+  known_ = in.number<bool>("known");
+  in.array("known gravity", known_gravity_, 3);
+  if (known_) in.fill("kicks", std::span(z_.data(), std::size_t(3 * plane_)));
+  in.end();
 }
 
 template class FilteredSheet<float>;

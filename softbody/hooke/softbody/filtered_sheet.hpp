@@ -54,6 +54,9 @@ class FilteredSheet final : public PointBody<S> {
   void release(Index point) override;
   void drive_pins(std::vector<Index> points, PinMotion motion) override;
   void take_back() override;
+  void describe(Blueprint& out) const override;
+  void save(CheckpointWriter& out) const override;
+  void load(CheckpointReader& in) override;
 
  protected:
   SolveResult substep(double t, double h) override;
@@ -76,6 +79,7 @@ class FilteredSheet final : public PointBody<S> {
 
   void lay_out_springs();
   void prepare(double h, bool contacts);
+  void factor();
   void find_held();
   void prepare_specials();
   static Line line_of(const LineFilter& filter, Index padded);

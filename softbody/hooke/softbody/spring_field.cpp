@@ -262,6 +262,15 @@ std::unique_ptr<Stepper<S>> SpringField<S>::stepper() const {
 #endif
 }
 
+template <class S>
+void SpringField<S>::describe(Blueprint& out) const {
+  CheckpointWriter springs;
+  springs.add(a_), springs.add(b_);
+  for (const Values<S>* values : {&stiffness_, &rest_, &damping_}) springs.add(*values);
+  out.add("springs", size());
+  out.add_sum("springs", springs);
+}
+
 template class SpringField<float>;
 template class SpringField<double>;
 

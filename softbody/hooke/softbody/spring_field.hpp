@@ -37,6 +37,8 @@ class SpringField final : public ForceField<S> {
   /// Force and step in one pass: for springs without dampers, where the build has Highway.
   std::unique_ptr<Stepper<S>> stepper() const override;
 
+  void describe(Blueprint& out) const override;
+
  private:
   struct Run {  // springs [first, first + count) join points a + i and b + i
     Index first, count, a, b;

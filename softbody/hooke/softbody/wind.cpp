@@ -153,6 +153,19 @@ typename ForceField<S>::Rates WindField<S>::rate_bounds(const Points<S>& x, cons
   return {0, double((damping(x, v) * inverse_mass).maxCoeff())};
 }
 
+template <class S>
+void WindField<S>::describe(Blueprint& out) const {
+  CheckpointWriter wind;
+  wind.add(wind_.velocity);
+  for (const double value : {wind_.gust, wind_.gust_period, wind_.swing, wind_.start, wind_.stop, wind_.fade,
+                             wind_.air_density, wind_.drag, wind_.lift})
+    wind.add(value);
+  wind.add(wind_.seed);
+  for (const Triangle& triangle : triangles_)
+    for (const int corner : triangle) wind.add(corner);
+  out.add_sum("wind", wind);
+}
+
 template class WindField<float>;
 template class WindField<double>;
 

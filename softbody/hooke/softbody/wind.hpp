@@ -43,6 +43,7 @@ class WindField final : public ForceField<S> {
   void add_damping_times(const Points<S>& x, const Points<S>& v, const Points<S>& d, Points<S>& out) const override;
   typename ForceField<S>::Rates rate_bounds(const Points<S>& x, const Points<S>& v,
                                             const Values<S>& inverse_mass) const override;
+  void describe(Blueprint& out) const override;
 
  private:
   struct Run {  // triangles whose corners all move on by one point from one to the next
