@@ -17,7 +17,10 @@ Vec3 row(const Points<double>& p, Index i) { return p.row(i).matrix().transpose(
 
 std::string StepReport::text() const {
   if (good()) return "good";
-  std::string what = status == Status::NotFinite ? "became infinite or NaN" : "the implicit solve did not converge";
+  const char* what = status == Status::NotFinite      ? "became infinite or NaN"
+                     : status == Status::NotConverged ? "the implicit solve did not converge"
+                     : status == Status::EnergyGrew   ? "gains energy from nowhere"
+                                                      : "takes steps that may be unstable";
   std::string where = "body \"" + body + "\"" + (point >= 0 ? ", point " + std::to_string(point) : "");
   return where + ": " + what + " after " + std::to_string(time) + " s; " + advice;
 }

@@ -22,6 +22,8 @@ struct StepReport {
     Good,
     NotFinite,     ///< a position or velocity became infinite or NaN
     NotConverged,  ///< an implicit solve missed its tolerance
+    EnergyGrew,    ///< more energy than there can be
+    StepTooLong,   ///< a substep above the largest that is surely stable; only ever a warning
   };
   Status status = Status::Good;
   std::string body;    ///< its name
@@ -108,6 +110,14 @@ class Body {
 
   virtual Energy energy(const Vec3& gravity) const = 0;
   virtual Vec3 momentum() const = 0;  ///< [kg m/s], free points
+
+  /// True where it has come to rest and its steps are skipped until something wakes it: a touch, an
+  /// edit, a force, a moved pin, other gravity.
+  virtual bool asleep() const { return false; }
+  virtual void wake() {}
+
+  /// What was noticed and did not stop it, each kind once until it has gone; cleared by the call.
+  virtual std::vector<StepReport> take_warnings() { return {}; }
 
   /// How it is moved. Costs as much as stable_step.
   virtual MotionFacts motion_facts() const { return {}; }

@@ -434,6 +434,7 @@ void Contacts<S>::touch(Index point, const Solid& before, const Solid& after, co
     at = {beyond, outward};
   }
   if (at.gap >= 0) return;
+  pushes_out_ = pushes_out_ || start_gap < S(-1e-4);
   const Vec& n = at.normal;
   // What starts outside ends outside; what starts inside leaves at no more than the push speed.
   const S target = std::min(S(0), std::min(S(0), start_gap) + S(kPushSpeed) * h);
@@ -513,6 +514,7 @@ void Contacts<S>::resolve(double t0, const Points<S>& from, double t1, const Val
   place_both(t0, t1);
   const S h = S(t1 - t0);
   touches_.clear();
+  pushes_out_ = false;
   if (!solids_.empty()) {
     // Somebody was thrown farther than a tick's bound: look again from where this substep began.
     if (((x - start_).square().rowwise().sum() > reach_.square()).any()) {

@@ -52,6 +52,9 @@ class Contacts {
   /// (and what is within 5 mm); `resolve` afterwards finds what went farther. Between begin_tick and the tick's end.
   void planes(double t0, const Points<S>& x, double t1, S reach, const Values<S>& inverse_mass,
               std::vector<ContactPlane<S>>& out);
+  /// True where the last `resolve` pushed out a point that had started well inside a solid: that costs the
+  /// solid energy.
+  bool pushes_out() const { return pushes_out_; }
 
   /// Speed at which points that start inside a solid are pushed out [m/s].
   static constexpr double kPushSpeed = 2;
@@ -114,6 +117,7 @@ class Contacts {
   std::vector<Candidate> candidates_;
   Points<S> average_velocity_;
   std::vector<Touch> touches_;  // of the last resolve
+  bool pushes_out_ = false;
   std::vector<const Collider*> callbacks_;
   Points<S> start_, lower_, upper_;
   Values<S> reach_, farthest_;

@@ -24,6 +24,10 @@ class ForceField {
   /// hold it: cheaper, but first order in the tick, and stable only while its damping rate × tick < 2.
   virtual bool once_a_tick() const { return false; }
 
+  /// True where the force depends on position and velocity alone and never gives energy to the body: springs,
+  /// drag. Only bodies of such fields sleep, and only their energy is watched.
+  virtual bool passive() const { return false; }
+
   /// f += force [N]. x [m] is relative to the body's origin, v [m/s], t [s]; shapes (n, 3).
   virtual void add_force(const Points<S>& x, const Points<S>& v, double t, Points<S>& f) const = 0;
 
@@ -57,6 +61,7 @@ class LinearDrag final : public ForceField<S> {
  public:
   /// @param coefficient [N·s/m], >= 0
   explicit LinearDrag(double coefficient);
+  bool passive() const override { return true; }
   bool uses_velocity() const override { return true; }
   void add_force(const Points<S>& x, const Points<S>& v, double t, Points<S>& f) const override;
   void add_damping_times(const Points<S>& x, const Points<S>& v, const Points<S>& d, Points<S>& out) const override;
@@ -74,6 +79,7 @@ class QuadraticDrag final : public ForceField<S> {
  public:
   /// @param coefficient [N·s²/m²], >= 0
   explicit QuadraticDrag(double coefficient);
+  bool passive() const override { return true; }
   bool uses_velocity() const override { return true; }
   void add_force(const Points<S>& x, const Points<S>& v, double t, Points<S>& f) const override;
   void add_damping_times(const Points<S>& x, const Points<S>& v, const Points<S>& d, Points<S>& out) const override;

@@ -69,11 +69,67 @@ void Integrator<S>::multiply(Dynamics<S>& dynamics, const Points<S>& x, const Po
   dynamics.add_implicit_times(x, v, h, safe, direction_, product_);
 }
 
+// sum += factor addend. What the sum's rounding drops waits in `low`.
+template <class S>
+void Integrator<S>::add(Points<S>& sum, Points<S>& low, double factor, const Points<S>& addend) {
+  const S scale = S(factor);
+  if (!compensated_) {
+    sum += scale * addend;
+    return;
+  }
+  if (low.rows() != sum.rows()) low.setZero(sum.rows(), 3);
+  S* const high = sum.data();
+  S* const kept = low.data();
+  const S* const part = addend.data();
+  for (Index i = 0; i < sum.size(); ++i) {
+    const S more = scale * part[i] + kept[i];
+    const S next = high[i] + more;
+    const S taken = next - high[i];
+    kept[i] = (high[i] - (next - taken)) + (more - taken);
+    high[i] = next;
+  }
+}
+
+template <class S>
+void Integrator<S>::drop_low(Index point) {
+  if (point < position_low_.rows()) position_low_.row(point).setZero();
+  if (point < velocity_low_.rows()) velocity_low_.row(point).setZero();
+}
+
+// Dynamics' own, and what sums kept for coordinates that it has set is dropped.
+template <class S>
+void Integrator<S>::collide(Dynamics<S>& dynamics, double t0, double t1, Points<S>& x, Points<S>& v) {
+  const bool keeps = compensated_ && position_low_.size() == x.size();
+  if (keeps) touched_x_ = x, touched_v_ = v;
+  dynamics.collide(t0, from_, t1, x, v);
+  if (!keeps) return;
+  position_low_ = (x == touched_x_).select(position_low_, S(0));
+  if (velocity_low_.size() == v.size()) velocity_low_ = (v == touched_v_).select(velocity_low_, S(0));
+}
+
+template <class S>
+void Integrator<S>::settle(Dynamics<S>& dynamics, Points<S>& v) {
+  const bool keeps = compensated_ && velocity_low_.size() == v.size();
+  if (keeps) touched_v_ = v;
+  dynamics.settle(v);
+  if (keeps) velocity_low_ = (v == touched_v_).select(velocity_low_, S(0));
+}
+
+template <class S>
+void Integrator<S>::prescribe(Dynamics<S>& dynamics, double t0, const Points<S>& from, double t1, Points<S>& x,
+                              Points<S>& v) {
+  dynamics.prescribe(t0, from, t1, x, v);
+  if (!compensated_) return;
+  const Values<S>& free = dynamics.inverse_mass();
+  for (Points<S>* low : {&position_low_, &velocity_low_})
+    for (int k = 0; k < 3 && low->rows() == free.size(); ++k) low->col(k) = (free == S(0)).select(S(0), low->col(k));
+}
+
 // Pins and surfaces after a move from from_ at t0 to x at t1.
 template <class S>
 void Integrator<S>::finish(Dynamics<S>& dynamics, double t0, double t1, Points<S>& x, Points<S>& v) {
-  if (dynamics.prescribes()) dynamics.prescribe(t0, from_, t1, x, v);
-  if (dynamics.collides()) dynamics.collide(t0, from_, t1, x, v);
+  if (dynamics.prescribes()) prescribe(dynamics, t0, from_, t1, x, v);
+  if (dynamics.collides()) collide(dynamics, t0, t1, x, v);
 }
 
 template <class S>
@@ -87,31 +143,33 @@ SolveResult Integrator<S>::run(const Splitting& table, Dynamics<S>& dynamics, Po
   double now = t;
   for (std::size_t i = 0; i < table.kick.size(); ++i) {
     if (table.kick[i] != 0) {
-      const S kick = S(table.kick[i] * h);
+      const double kick = table.kick[i] * h;
       if (!acceleration_known_) {
         if (uses_velocity && i > 0) {
           // The velocity at the end of this kick, predicted with the last acceleration: taking
           // the one at its start instead would cost an order.
-          predicted_ = v + kick * acceleration_;
+          predicted_ = v + S(kick) * acceleration_;
+          // What a surface holds does not move as its acceleration says: dampers would push for ever.
+          if (collides) dynamics.settle(predicted_);
           evaluate(dynamics, x, predicted_, now, acceleration_);
         } else {
           evaluate(dynamics, x, v, now, acceleration_);
         }
         acceleration_known_ = true;
       }
-      v += kick * acceleration_;
+      add(v, velocity_low_, kick, acceleration_);
     }
     if (table.drift[i] != 0) {
       const double next = i == last_drift ? t + h : now + table.drift[i] * h;
       if (held) drift_from_ = x;
-      x += S(table.drift[i] * h) * v;
-      if (held) dynamics.prescribe(now, drift_from_, next, x, v);
+      add(x, position_low_, table.drift[i] * h, v);
+      if (held) prescribe(dynamics, now, drift_from_, next, x, v);
       now = next;
       acceleration_known_ = false;
-      if (collides && i == last_drift) dynamics.collide(t, from_, t + h, x, v);
+      if (collides && i == last_drift) collide(dynamics, t, t + h, x, v);
     }
   }
-  if (collides && table.drift.back() == 0) dynamics.settle(v);
+  if (collides && table.drift.back() == 0) settle(dynamics, v);
   return {};
 }
 
@@ -122,19 +180,22 @@ SolveResult Integrator<S>::run(const Verlet&, Dynamics<S>& dynamics, Points<S>& 
   if (increment_step_ != h) {
     increment_ = step * v - (S(0.5) * step * step) * acceleration_;
     increment_step_ = h;
+    velocity_low_.setZero();
   }
-  increment_ += (step * step) * acceleration_;
+  // Here the low part of velocity is that of the increment.
+  add(increment_, velocity_low_, h * h, acceleration_);
   if (dynamics.prescribes() || dynamics.collides()) {
     from_ = x;
-    x += increment_;
+    add(x, position_low_, 1, increment_);
     v = increment_ / step;
     finish(dynamics, t, t + h, x, v);
     increment_ = step * v;
   } else {
-    x += increment_;
+    add(x, position_low_, 1, increment_);
   }
   if (dynamics.uses_velocity()) {
     predicted_ = increment_ / step + (S(0.5) * step) * acceleration_;
+    if (dynamics.collides()) dynamics.settle(predicted_);
     evaluate(dynamics, x, predicted_, t + h, acceleration_);
   } else {
     evaluate(dynamics, x, v, t + h, acceleration_);
@@ -189,8 +250,8 @@ SolveResult Integrator<S>::run(const RungeKutta& table, Dynamics<S>& dynamics, P
   } else {
     for (std::size_t i = 0; i < table.weight.size(); ++i) {
       if (table.weight[i] == 0) continue;
-      x += S(table.weight[i] * h) * stage_velocity_[i];
-      v += S(table.weight[i] * h) * stage_acceleration_[i];
+      add(x, position_low_, table.weight[i] * h, stage_velocity_[i]);
+      add(v, velocity_low_, table.weight[i] * h, stage_acceleration_[i]);
     }
   }
   finish(dynamics, t, t + h, x, v);
@@ -269,10 +330,10 @@ SolveResult Integrator<S>::run(const Nystrom& table, Dynamics<S>& dynamics, Poin
     if (held) dynamics.prescribe(t, from_, t + table.node[i] * h, stage_x_, stage_v_);
     evaluate(dynamics, stage_x_, stage_v_, t + table.node[i] * h, stage_acceleration_[i]);
   }
-  x += S(h) * v;
+  add(x, position_low_, h, v);
   for (std::size_t i = 0; i < stages; ++i) {
-    if (table.position[i] != 0) x += S(table.position[i] * h * h) * stage_acceleration_[i];
-    v += S(table.velocity[i] * h) * stage_acceleration_[i];
+    if (table.position[i] != 0) add(x, position_low_, table.position[i] * h * h, stage_acceleration_[i]);
+    add(v, velocity_low_, table.velocity[i] * h, stage_acceleration_[i]);
   }
   finish(dynamics, t, t + h, x, v);
   return {};

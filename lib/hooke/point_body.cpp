@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <limits>
 #include <stdexcept>
 
@@ -16,14 +17,12 @@ constexpr double kStepSafety = 0.9;
 constexpr double kEstimateInterval = 1.0 / 30;
 // Positions and velocities below this never make a force overflow by themselves.
 constexpr double kOrdinary = 1e9;
+// A given substep is held against the stable one this often [s].
+constexpr double kStepCheckInterval = 0.25;
+// Given steps below this share of the stable one are taken where sums are compensated.
+constexpr double kTinyStep = 0.05;
 // Methods without a stable step still need one: ω h of this.
 constexpr double kUnstablePhase = 0.05;
-
-// As allFinite, in vector code: what is not finite makes NaN of its product with zero.
-template <class S>
-bool finite(const Points<S>& p) {
-  return (p * S(0)).sum() == S(0);
-}
 
 void check_finite(const Vec3& value, const char* what) {
   if (!value.allFinite()) throw std::invalid_argument(std::string(what) + " must be finite");
@@ -33,7 +32,10 @@ void check_finite(const Vec3& value, const char* what) {
 
 template <class S>
 PointBody<S>::PointBody(std::string name, PointMasses<S> points, MotionSettings settings)
-    : Body(std::move(name)), points_(std::move(points)), settings_(settings), integrator_(*settings.method) {
+    : Body(std::move(name)),
+      points_(std::move(points)),
+      settings_(settings),
+      integrator_(*settings.method, settings.compensated && std::is_same_v<S, float>) {
   const auto fail = [&](const std::string& rule) {
     throw std::invalid_argument("body \"" + this->name() + "\": " + rule);
   };
@@ -48,12 +50,15 @@ PointBody<S>::PointBody(std::string name, PointMasses<S> points, MotionSettings 
   if (!(settings_.dt >= 0) || !std::isfinite(settings_.dt)) fail("dt must not be negative");
   if (!(settings_.thickness >= 0) || !std::isfinite(settings_.thickness)) fail("thickness must not be negative");
   if (!(settings_.tolerance > 0) || !std::isfinite(settings_.tolerance)) fail("tolerance must be positive");
+  if (settings_.retries < 0) fail("retries must not be negative");
   start_ = previous_position_ = points_.position;
   previous_velocity_ = points_.velocity;
 }
 
 template <class S>
 void PointBody<S>::add_field(std::unique_ptr<const ForceField<S>> field) {
+  passive_ = passive_ && field->passive();
+  wake();
   if (field->once_a_tick()) {
     held_fields_.push_back(std::move(field));
     return;
@@ -91,6 +96,7 @@ void PointBody<S>::set_position(Index point, const Vec3& position) {
   check_finite(position, "position");
   points_.position.row(point) = (position - points_.origin).transpose().template cast<S>();
   previous_position_.row(point) = points_.position.row(point);
+  changed(point);
 }
 
 template <class S>
@@ -98,12 +104,29 @@ void PointBody<S>::set_velocity(Index point, const Vec3& velocity) {
   check(point);
   check_finite(velocity, "velocity");
   points_.velocity.row(point) = velocity.transpose().template cast<S>();
+  changed(point);
+}
+
+// Somebody has edited a point.
+template <class S>
+void PointBody<S>::changed(Index point) {
+  integrator_.drop_low(point);
+  free_mass_ = -1;
+  wake();
+}
+
+template <class S>
+void PointBody<S>::wake() {
+  asleep_ = false;
+  quiet_since_ = tick_.end;
+  energy_watch_.forget();
 }
 
 template <class S>
 void PointBody<S>::hold(Index point) {
   points_.inverse_mass[point] = 0;
   points_.velocity.row(point).setZero();
+  changed(point);
 }
 
 template <class S>
@@ -121,6 +144,7 @@ void PointBody<S>::release(Index point) {
     for (Index& driven : group.points)
       if (driven == point) driven = -1;
   last_estimate_ = -1;
+  changed(point);
 }
 
 template <class S>
@@ -139,6 +163,7 @@ void PointBody<S>::move_pin(Index point, const Vec3& target) {
   const Vec3 from = points_.origin + points_.position.row(point).matrix().transpose().template cast<double>();
   std::erase_if(moving_, [&](const Moving& pin) { return pin.point == point; });
   moving_.push_back({point, from, target});
+  wake();
 }
 
 template <class S>
@@ -371,7 +396,7 @@ SolveResult PointBody<S>::substep(double t, double h) {
 template <class S>
 bool PointBody<S>::run_fast() {
   const auto* table = std::get_if<Splitting>(&settings_.method->scheme);
-  if (!fused() || watching_ || prescribes() || collides()) return false;
+  if (!fused() || watching_ || prescribes() || collides() || tiny_steps_) return false;
   const double h = (tick_.end - tick_.start) / double(substeps_);
   stages_.clear();
   std::int64_t evaluations = 0;
@@ -389,6 +414,7 @@ bool PointBody<S>::run_fast() {
   stepper_->load(points_, tick_.gravity, pushing_ ? &push_acceleration_ : nullptr);
   stepper_->run(stages_, tick_.gang);
   stepper_->store(points_);
+  integrator_.drop_low();
   integrator_.count(evaluations);
   return true;
 }
@@ -431,44 +457,240 @@ StepReport PointBody<S>::explain(bool finite_state) {
     report.advice = "the force on it was not finite at ordinary positions and velocities; check its force fields";
     return report;
   }
-  const double stable = stable_step();
-  const std::string limit = stable == 0             ? "0 (none undamped)"
-                            : std::isfinite(stable) ? std::to_string(1e3 * stable) + " ms"
-                                                    : "without bound";
-  report.advice = "the substep was " +
-                  std::to_string(1e3 * (tick_.end - tick_.start) / double(std::max<Index>(substeps(), 1))) +
-                  " ms, the largest stable one of " + std::string(settings_.method->name) + " is " + limit +
-                  "; lower dt, lower the stiffness or choose another method";
+  report.advice = step_advice();
   return report;
 }
 
 template <class S>
+std::string PointBody<S>::step_advice() const {
+  const double stable = stable_step();
+  const std::string limit = stable == 0             ? "0 (none undamped)"
+                            : std::isfinite(stable) ? std::to_string(1e3 * stable) + " ms"
+                                                    : "without bound";
+  return "the substep was " + std::to_string(1e3 * (tick_.end - tick_.start) / double(std::max<Index>(substeps(), 1))) +
+         " ms, the largest that is surely stable with " + std::string(settings_.method->name) + " is " + limit +
+         "; lower dt, lower the stiffness or choose another method";
+}
+
+// tick_ with the present number of substeps; where it fails, the state is that of before.
+template <class S>
+StepReport PointBody<S>::try_tick() {
+  const SolveResult solve = run_tick();
+  // What is not finite anywhere is not finite in the velocities, and so in their energy.
+  const auto& v = points_.velocity;
+  const double kinetic =
+      0.5 * double((points_.mass * (v.col(0).square() + v.col(1).square() + v.col(2).square())).sum());
+  const bool good = std::isfinite(kinetic) || (points_.position.allFinite() && v.allFinite());
+  if (!good || !solve.converged) return explain(good);
+  if (StepReport report = watch_energy(kinetic); !report.good()) return report;
+  rest(kinetic);
+  return {};
+}
+
+template <class S>
 StepReport PointBody<S>::advance(const Tick& tick) {
+  if (asleep_ && !disturbed(tick)) return {};
+  if (asleep_) wake();
   tick_ = tick;
   previous_position_ = points_.position;
   previous_velocity_ = points_.velocity;
   if (size() == 0) return {};
+  if (tick.gravity != last_gravity_) energy_watch_.forget();
+  last_gravity_ = tick.gravity;
   choose_substeps(tick);
   spend_bank(tick.end - tick.start);
   hold_fields(tick.start);
-  const SolveResult solve = run_tick();
-  const bool good = finite(points_.position) && finite(points_.velocity);
-  if (!good || !solve.converged) return explain(good);
+  check_step();
+  begin_energy_watch();
+  StepReport report = try_tick();
+  for (int retry = 0; retry < settings_.retries && !report.good() && substeps_ < settings_.max_substeps; ++retry) {
+    substeps_ = std::min(2 * substeps_, settings_.max_substeps);
+    report = try_tick();
+  }
+  if (!report.good()) return report;
   if (!moving_.empty() && tick.end >= frame_end_) {
     for (const Moving& pin : moving_) points_.velocity.row(pin.point).setZero();
     moving_.clear();
+    energy_watch_.forget();
   }
   return {};
+}
+
+// What is asleep feels these.
+template <class S>
+bool PointBody<S>::disturbed(const Tick& tick) {
+  if (tick.gravity != last_gravity_ || !bank_.empty()) return true;
+  for (Driven& group : driven_) {
+    group.motion(tick.end, group.place);
+    for (std::size_t i = 0; i < group.points.size(); ++i)
+      for (int k = 0; k < 3 && group.points[i] >= 0; ++k)
+        if (S(group.place(Index(i), k) - points_.origin[k]) != points_.position(group.points[i], k)) return true;
+  }
+  if (!settings_.collides || tick.colliders.empty()) return false;
+  if (!surroundings_known_) surroundings_.remember(tick.colliders, tick.start, positions(), settings_.thickness);
+  surroundings_known_ = true;
+  return surroundings_.changed(tick.colliders, tick.end);
+}
+
+template <class S>
+bool PointBody<S>::loses_energy() const {
+  const bool method_does = settings_.method->stability_limit != 0 && !settings_.method->symplectic;
+  return uses_velocity_ || !held_fields_.empty() || damped_ || method_does || contacts_.any();
+}
+
+// Falls asleep after a good tick at whose end nothing moves or wants to.
+template <class S>
+void PointBody<S>::rest(double kinetic) {
+  if (!settings_.sleeps || !passive_ || !bank_.empty() || !moving_.empty()) return;
+  if (free_mass_ < 0) free_mass_ = double((points_.inverse_mass > S(0)).select(points_.mass, S(0)).sum());
+  if (2 * kinetic > kQuietSpeed * kQuietSpeed * free_mass_) {
+    quiet_since_ = tick_.end;
+    return;
+  }
+  if (tick_.end - quiet_since_ < kQuietTime * (1 - 1e-9)) return;
+  quiet_since_ = tick_.end - 0.5 * kQuietTime;  // where it does not sleep yet, do not ask at every tick
+  const bool quick = double(points_.velocity.square().sum()) > kQuietSpeed * kQuietSpeed * double(size());
+  if (quick || !loses_energy() || !balanced()) return;
+  asleep_ = true;
+  damped_ = false;
+  surroundings_known_ = false;
+  points_.velocity.setZero();
+  previous_position_ = points_.position;
+  previous_velocity_ = points_.velocity;
+  integrator_.drop_low();
+}
+
+// Σ m |a| at x, of what surfaces leave.
+template <class S>
+double PointBody<S>::unbalanced(const Points<S>& x, Points<S>& left) {
+  const Points<S> still = Points<S>::Zero(size(), 3);
+  left.resize(size(), 3);
+  acceleration(x, still, tick_.end, left);
+  settle(left);  // as it takes from velocities what surfaces stop, so it does from accelerations
+  return double((points_.mass * left.square().rowwise().sum().sqrt()).sum());
+}
+
+template <class S>
+double PointBody<S>::residual_force(const Vec3& gravity) {
+  tick_.gravity = gravity;
+  Points<S> left;
+  return unbalanced(points_.position, left);
+}
+
+// True where a share of the weight holds all forces, or nothing but the rounding of positions is left of them.
+template <class S>
+bool PointBody<S>::balanced() {
+  Points<S> left, other;
+  const double residual = unbalanced(points_.position, left);
+  if (residual <= kQuietForce * free_mass_ * tick_.gravity.norm()) return true;
+  // A rounding is off by 1/√12 of an ulp; neighbours must differ: signs from the bits of a multiplied index.
+  Points<S> x = points_.position;
+  for (Index i = 0; i < x.size(); ++i) {
+    const bool up = (std::uint32_t(i) * 2654435761u) >> 31;
+    x.data()[i] = std::nextafter(x.data()[i], up ? std::numeric_limits<S>::max() : std::numeric_limits<S>::lowest());
+  }
+  unbalanced(x, other);
+  other -= left;
+  const double noise = double((points_.mass * other.square().rowwise().sum().sqrt()).sum()) / std::sqrt(12.0);
+  return residual <= 2 * noise;
+}
+
+// Nothing gives it energy in the coming tick, as far as is known before it.
+template <class S>
+bool PointBody<S>::alone() const {
+  return settings_.watches_energy && passive_ && !pushing_ && !prescribes();
+}
+
+// [J], with heights from the body's own origin.
+template <class S>
+double PointBody<S>::total_energy() const {
+  double mass = 0;
+  for (Index i = 0; i < size(); ++i)
+    if (points_.inverse_mass[i] != 0) mass += double(points_.mass[i]);
+  return energy(tick_.gravity).total() + mass * tick_.gravity.dot(points_.origin);
+}
+
+template <class S>
+void PointBody<S>::begin_energy_watch() {
+  if (!alone()) {
+    energy_watch_.forget();
+    return;
+  }
+  if (energy_watch_.knows()) return;
+  // Positions err by their rounding: so do heights, and springs by its square.
+  const double off = double(std::numeric_limits<S>::epsilon()) * double(points_.position.abs().maxCoeff());
+  const double noise = rate_bounds().omega_squared * off * off + tick_.gravity.norm() * off;
+  energy_watch_.start(total_energy(), energy(tick_.gravity).kinetic, 64 * total_mass() * noise);
+}
+
+// After a tick that ended with this kinetic energy [J].
+template <class S>
+StepReport PointBody<S>::watch_energy(double kinetic) {
+  if (contacts_.any()) {
+    bool driven = contacts_.pushes_out();
+    for (const Collider& collider : tick_.colliders) driven = driven || collider.motion || collider.distance;
+    if (driven) energy_watch_.forget();
+  }
+  if (!energy_watch_.due(kinetic)) return {};
+  const double total = total_energy();
+  const auto finding = energy_watch_.judge(total, kinetic);
+  if (finding == EnergyWatch::Finding::Fine) return {};
+  StepReport report;
+  report.status = StepReport::Status::EnergyGrew;
+  report.body = name();
+  report.time = tick_.start;
+  points_.velocity.square().rowwise().sum().maxCoeff(&report.point);
+  report.advice = std::to_string(energy_watch_.gain(total)) + " J since it was last given any, " +
+                  std::to_string(kinetic) + " J are in its motion, most at this point; " + step_advice();
+  if (finding == EnergyWatch::Finding::Grows) {
+    warn(std::move(report), warned_of_energy_);
+    return {};
+  }
+  take_back();
+  energy_watch_.forget();
+  return report;
+}
+
+// Warns of substeps above the largest that is surely stable.
+template <class S>
+void PointBody<S>::check_step() {
+  tiny_steps_ = false;
+  if (adapts() || (settings_.dt == 0 && substeps_ < settings_.max_substeps)) return;
+  const double h = (tick_.end - tick_.start) / double(substeps_);
+  if (step_checked_ < 0 || tick_.start - step_checked_ >= kStepCheckInterval * (1 - 1e-9)) {
+    step_checked_ = tick_.start;
+    checked_limit_ = stable_step();
+  }
+  tiny_steps_ = std::is_same_v<S, float> && settings_.compensated && h < kTinyStep * checked_limit_;
+  if (h <= checked_limit_) {
+    warned_of_step_ = false;
+    return;
+  }
+  StepReport report;
+  report.status = StepReport::Status::StepTooLong;
+  report.body = name();
+  report.time = tick_.start;
+  report.advice = step_advice();
+  warn(std::move(report), warned_of_step_);
+}
+
+template <class S>
+void PointBody<S>::warn(StepReport warning, bool& warned) {
+  if (!warned) warnings_.push_back(std::move(warning));
+  warned = true;
 }
 
 template <class S>
 void PointBody<S>::take_back() {
   points_.position = previous_position_;
   points_.velocity = previous_velocity_;
+  integrator_.drop_low();
 }
 
 template <class S>
 void PointBody<S>::damp(double factor) {
+  if (asleep_) return;
+  damped_ = damped_ || factor < 1;
   for (int k = 0; k < 3; ++k)
     points_.velocity.col(k) *= (points_.inverse_mass > S(0)).select(Values<S>::Constant(size(), S(factor)), S(1));
 }

@@ -4,12 +4,15 @@
 
 #include <hooke/body.hpp>
 #include <hooke/contacts.hpp>
+#include <hooke/energy_watch.hpp>
 #include <hooke/force_field.hpp>
 #include <hooke/integrator.hpp>
 #include <hooke/point_masses.hpp>
+#include <hooke/surroundings.hpp>
 
 #include <deque>
 #include <memory>
+#include <utility>
 
 namespace hooke {
 
@@ -23,6 +26,17 @@ struct MotionSettings {
   /// Adaptive methods with dt = 0: most that the estimated error of a step may be [m], as in
   /// Integrator::adapt; > 0. The error of a second is about as many times this as steps it takes.
   double tolerance = 1e-6;
+  /// In float, sums of positions and velocities keep what rounding drops (see Integrator): without it, steps of
+  /// less than a hundred-millionth of the body's size a step are lost. Where a stepper moves the body only for given
+  /// steps below a twentieth of the stable one, which then take the general way.
+  bool compensated = true;
+  /// Bodies of passive fields that lose energy (dampers, drag, friction, global damping, a method that does)
+  /// sleep once they are at rest, as PointBody::kQuietSpeed and its neighbours say.
+  bool sleeps = true;
+  /// Energy that a body of passive fields alone gains from nowhere is an error: off, it is not looked at.
+  bool watches_energy = true;
+  /// A tick that fails is tried again with twice the substeps, this often.
+  int retries = 0;
 };
 
 template <class S>
@@ -37,6 +51,13 @@ class PointBody : public Body, protected Dynamics<S> {
 
   const PointMasses<S>& state() const { return points_; }
   const MotionSettings& settings() const { return settings_; }
+  /// Rest: for so long [s] its RMS speed was below this [m/s], and of its forces, Σ |f_i| over its points, what
+  /// surfaces bear taken off, no more is left than this share of its weight or what the rounding of its positions
+  /// makes of stiff springs in float.
+  static constexpr double kQuietSpeed = 1e-4, kQuietTime = 0.5, kQuietForce = 0.01;
+  /// Σ |f_i| over free points [N] of gravity, fields and contacts, were it at rest where it is. Cost: one evaluation.
+  virtual double residual_force(const Vec3& gravity);
+
   Index substeps() const { return adapts() ? integrator_.adapted_steps() : substeps_; }  ///< in the last tick
 
   /// True where a stepper of its only field moves it: a splitting method, forces of position alone. Ticks with
@@ -76,6 +97,9 @@ class PointBody : public Body, protected Dynamics<S> {
   void describe(Blueprint& out) const override;
   void save(CheckpointWriter& out) const override;
   void load(CheckpointReader& in) override;
+  bool asleep() const override { return asleep_; }
+  void wake() override;
+  std::vector<StepReport> take_warnings() override { return std::exchange(warnings_, {}); }
 
  protected:
   // Dynamics: the equations of motion of these points.
@@ -93,6 +117,8 @@ class PointBody : public Body, protected Dynamics<S> {
 
   /// One substep; linear rigid bodies add their impacts to it.
   virtual SolveResult substep(double t, double h);
+  /// True where its motion dies down by itself.
+  virtual bool loses_energy() const;
 
   void check(Index point) const;
   /// True where fields or pushes add to gravity in this tick.
@@ -128,6 +154,19 @@ class PointBody : public Body, protected Dynamics<S> {
   SolveResult run_tick();
   bool run_fast();
   StepReport explain(bool finite_state);
+  StepReport try_tick();
+  void changed(Index point);
+  bool disturbed(const Tick& tick);
+  void rest(double kinetic);
+  bool balanced();
+  double unbalanced(const Points<S>& x, Points<S>& left);
+  bool alone() const;
+  double total_energy() const;
+  void begin_energy_watch();
+  StepReport watch_energy(double kinetic);
+  void check_step();
+  std::string step_advice() const;
+  void warn(StepReport warning, bool& warned);
 
   MotionSettings settings_;
   Integrator<S> integrator_;
@@ -146,6 +185,20 @@ class PointBody : public Body, protected Dynamics<S> {
   double frame_start_ = 0, frame_end_ = 0;
   Index substeps_ = 0;
   double wanted_dt_ = 0, last_estimate_ = -1;
+  bool passive_ = true;    // all fields are
+  double free_mass_ = -1;  // [kg]; negative: to be summed up again
+
+  bool asleep_ = false, damped_ = false;  // damped_: by the world, lately
+  double quiet_since_ = 0;
+  Vec3 last_gravity_{0, 0, 0};
+  Surroundings surroundings_;
+  bool surroundings_known_ = false;
+
+  EnergyWatch energy_watch_;
+  std::vector<StepReport> warnings_;
+  bool warned_of_energy_ = false, warned_of_step_ = false;
+  double step_checked_ = -1, checked_limit_ = 0;
+  bool tiny_steps_ = false;
 
   // While a failed tick is run once more to find out what went wrong.
   bool watching_ = false;

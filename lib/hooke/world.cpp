@@ -33,6 +33,18 @@ void World::add_collider(Collider collider) {
     if (set && !set->grid) throw std::invalid_argument("collider \"" + collider.name + "\": a level set needs a grid");
   }
   colliders_.push_back(std::move(collider));
+  wake();
+}
+
+void World::wake() {
+  for (const auto& body : bodies_) body->wake();
+}
+
+std::vector<StepReport> World::take_warnings() {
+  std::vector<StepReport> all;
+  for (const auto& body : bodies_)
+    for (StepReport& warning : body->take_warnings()) all.push_back(std::move(warning));
+  return all;
 }
 
 void World::set_gravity(const Vec3& gravity) {
@@ -44,6 +56,7 @@ void World::set_damping(double fraction_per_second) {
   if (!(fraction_per_second >= 0 && fraction_per_second < 1))
     throw std::invalid_argument("World: damping is a fraction per second in [0, 1), got " +
                                 std::to_string(fraction_per_second));
+  if (damping_ != fraction_per_second) wake();
   damping_ = fraction_per_second;
 }
 

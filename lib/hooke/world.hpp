@@ -37,7 +37,7 @@ class World {
   void add_collider(Collider collider);
   const std::vector<Collider>& colliders() const { return colliders_; }
 
-  void set_gravity(const Vec3& gravity);  ///< [m/s²]
+  void set_gravity(const Vec3& gravity);  ///< [m/s²]; wakes what sleeps where it is another
   void enable_gravity(bool on) { gravity_on_ = on; }
   Vec3 gravity() const { return gravity_on_ ? gravity_ : Vec3(Vec3::Zero()); }
 
@@ -59,6 +59,11 @@ class World {
   /// Moves everything by a frame of any length: as many whole ticks as there is room for; the
   /// rest waits. Stops at the first tick that fails; every body keeps its state of before that tick.
   StepReport update(double frame_seconds);
+
+  /// Wakes all bodies. Edits, forces, pins, gravity and moving colliders do so by themselves.
+  void wake();
+  /// What bodies noticed since the last call and did not stop them: steps that may be unstable, energy that grows.
+  std::vector<StepReport> take_warnings();
 
   const Clock& clock() const { return clock_; }
   double time() const { return clock_.time(); }

@@ -22,6 +22,7 @@ class SpringField final : public ForceField<S> {
   SpringField(std::shared_ptr<const SpringNetwork> network, const Points<S>& start, bool two_floats = false);
 
   bool uses_velocity() const override { return damped_; }
+  bool passive() const override { return true; }
   void add_force(const Points<S>& x, const Points<S>& v, double t, Points<S>& f) const override;
   void add_stiffness_times(const Points<S>& x, const Points<S>& d, bool safe, Points<S>& out) const override;
   void add_damping_times(const Points<S>& x, const Points<S>& v, const Points<S>& d, Points<S>& out) const override;
