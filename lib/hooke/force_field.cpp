@@ -19,6 +19,12 @@ double checked_coefficient(const char* who, double coefficient) {
 }  // namespace
 
 template <class S>
+void ForceField<S>::add_fine_force(const Points<S>& x, const Points<S>&, const Points<S>& v, double t,
+                                   Points<S>& f) const {
+  add_force(x, v, t, f);
+}
+
+template <class S>
 void ForceField<S>::add_stiffness_times(const Points<S>&, const Points<S>&, bool, Points<S>&) const {}
 
 template <class S>

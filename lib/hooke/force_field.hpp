@@ -31,6 +31,11 @@ class ForceField {
   /// f += force [N]. x [m] is relative to the body's origin, v [m/s], t [s]; shapes (n, 3).
   virtual void add_force(const Points<S>& x, const Points<S>& v, double t, Points<S>& f) const = 0;
 
+  /// As add_force, at x + low, where `low` holds what the rounding of x has dropped: for forces that come from
+  /// small differences of places.
+  virtual void add_fine_force(const Points<S>& x, const Points<S>& low, const Points<S>& v, double t,
+                              Points<S>& f) const;
+
   /// out += K d, where K = -∂f/∂x [N/m]. With `safe`, negative eigenvalues are left out, so
   /// that conjugate gradients cannot fail. A field without stiffness adds nothing.
   virtual void add_stiffness_times(const Points<S>& x, const Points<S>& d, bool safe, Points<S>& out) const;

@@ -44,16 +44,24 @@ void Integrator<S>::save(CheckpointWriter& out) const {
   out.add(std::int64_t(adapted_steps_));
   out.add(work_.evaluations);
   out.add(work_.products);
+  for (const Points<S>* low : {&position_low_, &velocity_low_}) {
+    out.add(low->rows() > 0);
+    if (low->rows() > 0) out.add(*low);
+  }
 }
 
 template <class S>
-void Integrator<S>::load(CheckpointReader& in) {
+void Integrator<S>::load(CheckpointReader& in, Index points) {
   restart();
   adapted_step_ = in.number<double>("adapted step", 0);
   adapted_error_ = in.number<double>("adapted error", 0);
   adapted_steps_ = Index(in.number<std::int64_t>("adapted steps", 0));
   work_.evaluations = in.number<std::int64_t>("evaluations", 0);
   work_.products = in.number<std::int64_t>("products", 0);
+  for (Points<S>* low : {&position_low_, &velocity_low_}) {
+    low->resize(0, 3);
+    if (in.number<bool>("has low parts")) in.array("low parts", *low, points);
+  }
 }
 
 template <class S>

@@ -98,10 +98,12 @@ class Integrator {
 
   /// What is kept by restart. Loading restarts.
   void save(CheckpointWriter& out) const;
-  void load(CheckpointReader& in);
+  void load(CheckpointReader& in, Index points);
   /// Drops what compensated sums keep: of all points, or of one whose x or v somebody else has set.
   void drop_low() { position_low_.setZero(), velocity_low_.setZero(); }
   void drop_low(Index point);
+  /// What x is too small by, (n, 3), or null where nothing is kept.
+  const Points<S>* position_low() const { return position_low_.rows() ? &position_low_ : nullptr; }
 
  private:
   SolveResult run(const Splitting&, Dynamics<S>&, Points<S>& x, Points<S>& v, double t, double h);

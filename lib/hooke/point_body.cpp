@@ -19,8 +19,9 @@ constexpr double kEstimateInterval = 1.0 / 30;
 constexpr double kOrdinary = 1e9;
 // A given substep is held against the stable one this often [s].
 constexpr double kStepCheckInterval = 0.25;
-// Given steps below this share of the stable one are taken where sums are compensated.
-constexpr double kTinyStep = 0.05;
+// In float, bodies that move less than so many roundings of their size a substep are moved where sums are
+// compensated.
+constexpr double kSlow = 256;
 // Methods without a stable step still need one: ω h of this.
 constexpr double kUnstablePhase = 0.05;
 
@@ -261,7 +262,14 @@ void PointBody<S>::acceleration(const Points<S>& x, const Points<S>& v, double t
     a.setZero(x.rows(), 3);
   } else {
     force_.setZero(x.rows(), 3);
-    for (const auto& field : fields_) field->add_force(x, v, t, force_);
+    // Only of the state itself is it known what rounding has dropped.
+    const Points<S>* low = &x == &points_.position ? integrator_.position_low() : nullptr;
+    for (const auto& field : fields_) {
+      if (low)
+        field->add_fine_force(x, *low, v, t, force_);
+      else
+        field->add_force(x, v, t, force_);
+    }
     a.resize(x.rows(), 3);
     for (int k = 0; k < 3; ++k) a.col(k) = force_.col(k) * points_.inverse_mass;
   }
@@ -396,8 +404,12 @@ SolveResult PointBody<S>::substep(double t, double h) {
 template <class S>
 bool PointBody<S>::run_fast() {
   const auto* table = std::get_if<Splitting>(&settings_.method->scheme);
-  if (!fused() || watching_ || prescribes() || collides() || tiny_steps_) return false;
+  if (!fused() || watching_ || prescribes() || collides()) return false;
   const double h = (tick_.end - tick_.start) / double(substeps_);
+  if (std::is_same_v<S, float> && settings_.compensated) {
+    const double least = kSlow * double(std::numeric_limits<S>::epsilon()) * double(points_.position.abs().maxCoeff());
+    if (h * std::sqrt(double(points_.velocity.square().sum()) / double(size())) < least) return false;
+  }
   stages_.clear();
   std::int64_t evaluations = 0;
   for (Index i = 0; i < substeps_; ++i)
@@ -557,7 +569,6 @@ void PointBody<S>::rest(double kinetic) {
   points_.velocity.setZero();
   previous_position_ = points_.position;
   previous_velocity_ = points_.velocity;
-  integrator_.drop_low();
 }
 
 // Σ m |a| at x, of what surfaces leave.
@@ -581,10 +592,10 @@ double PointBody<S>::residual_force(const Vec3& gravity) {
 template <class S>
 bool PointBody<S>::balanced() {
   Points<S> left, other;
-  const double residual = unbalanced(points_.position, left);
-  if (residual <= kQuietForce * free_mass_ * tick_.gravity.norm()) return true;
+  if (unbalanced(points_.position, left) <= kQuietForce * free_mass_ * tick_.gravity.norm()) return true;
   // A rounding is off by 1/√12 of an ulp; neighbours must differ: signs from the bits of a multiplied index.
   Points<S> x = points_.position;
+  const double residual = unbalanced(x, left);
   for (Index i = 0; i < x.size(); ++i) {
     const bool up = (std::uint32_t(i) * 2654435761u) >> 31;
     x.data()[i] = std::nextafter(x.data()[i], up ? std::numeric_limits<S>::max() : std::numeric_limits<S>::lowest());
@@ -654,14 +665,12 @@ StepReport PointBody<S>::watch_energy(double kinetic) {
 // Warns of substeps above the largest that is surely stable.
 template <class S>
 void PointBody<S>::check_step() {
-  tiny_steps_ = false;
   if (adapts() || (settings_.dt == 0 && substeps_ < settings_.max_substeps)) return;
   const double h = (tick_.end - tick_.start) / double(substeps_);
   if (step_checked_ < 0 || tick_.start - step_checked_ >= kStepCheckInterval * (1 - 1e-9)) {
     step_checked_ = tick_.start;
     checked_limit_ = stable_step();
   }
-  tiny_steps_ = std::is_same_v<S, float> && settings_.compensated && h < kTinyStep * checked_limit_;
   if (h <= checked_limit_) {
     warned_of_step_ = false;
     return;
@@ -710,6 +719,9 @@ void PointBody<S>::describe(Blueprint& out) const {
   out.add("collides", settings_.collides);
   out.add("max_substeps", settings_.max_substeps);
   out.add("tolerance", settings_.tolerance);
+  out.add("compensated", settings_.compensated);
+  out.add("sleeps", settings_.sleeps);
+  out.add("retries", Index(settings_.retries));
   out.add("number of force fields", Index(fields_.size()));
   out.add("number of held force fields", Index(held_fields_.size()));
   for (const auto* fields : {&fields_, &held_fields_})
@@ -763,6 +775,13 @@ void PointBody<S>::save(CheckpointWriter& out) const {
   out.add(last_estimate_);
   integrator_.save(out);
   out.end();
+
+  out.begin("rest");
+  out.add(asleep_);
+  out.add(damped_);
+  out.add(quiet_since_);
+  out.add(last_gravity_);
+  out.end();
 }
 
 template <class S>
@@ -814,8 +833,18 @@ void PointBody<S>::load(CheckpointReader& in) {
   substeps_ = Index(in.number<std::int64_t>("substeps", 0, settings_.max_substeps));
   wanted_dt_ = in.number<double>("wanted step", 0, std::numeric_limits<double>::infinity());
   last_estimate_ = in.number<double>("last estimate", -1);
-  integrator_.load(in);
+  integrator_.load(in, n);
   in.end();
+
+  in.begin("rest");
+  asleep_ = in.number<bool>("asleep");
+  damped_ = in.number<bool>("damped");
+  quiet_since_ = in.number<double>("quiet since");
+  in.array("last gravity", last_gravity_, 3);
+  in.end();
+  surroundings_known_ = false;
+  energy_watch_.forget();
+  free_mass_ = step_checked_ = -1;
 }
 
 template class PointBody<float>;

@@ -26,9 +26,9 @@ struct MotionSettings {
   /// Adaptive methods with dt = 0: most that the estimated error of a step may be [m], as in
   /// Integrator::adapt; > 0. The error of a second is about as many times this as steps it takes.
   double tolerance = 1e-6;
-  /// In float, sums of positions and velocities keep what rounding drops (see Integrator): without it, steps of
-  /// less than a hundred-millionth of the body's size a step are lost. Where a stepper moves the body only for given
-  /// steps below a twentieth of the stable one, which then take the general way.
+  /// In float, sums of positions and velocities keep what rounding drops (see Integrator). Without it what moves
+  /// less than a rounding of its place a substep stays where it is, and what should rest shakes. Bodies that
+  /// steppers move take the general way while they are that slow.
   bool compensated = true;
   /// Bodies of passive fields that lose energy (dampers, drag, friction, global damping, a method that does)
   /// sleep once they are at rest, as PointBody::kQuietSpeed and its neighbours say.
@@ -54,7 +54,7 @@ class PointBody : public Body, protected Dynamics<S> {
   /// Rest: for so long [s] its RMS speed was below this [m/s], and of its forces, Σ |f_i| over its points, what
   /// surfaces bear taken off, no more is left than this share of its weight or what the rounding of its positions
   /// makes of stiff springs in float.
-  static constexpr double kQuietSpeed = 1e-4, kQuietTime = 0.5, kQuietForce = 0.01;
+  static constexpr double kQuietSpeed = 2e-4, kQuietTime = 0.5, kQuietForce = 0.01;
   /// Σ |f_i| over free points [N] of gravity, fields and contacts, were it at rest where it is. Cost: one evaluation.
   virtual double residual_force(const Vec3& gravity);
 
@@ -198,7 +198,6 @@ class PointBody : public Body, protected Dynamics<S> {
   std::vector<StepReport> warnings_;
   bool warned_of_energy_ = false, warned_of_step_ = false;
   double step_checked_ = -1, checked_limit_ = 0;
-  bool tiny_steps_ = false;
 
   // While a failed tick is run once more to find out what went wrong.
   bool watching_ = false;

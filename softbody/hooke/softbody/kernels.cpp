@@ -20,17 +20,20 @@ HOOKE_INLINE void add(S* target, const S* source, S sign, int n) {
   for (int i = 0; i < n; ++i) target[i] += sign * source[i];
 }
 
-template <class S, bool damped>
+template <class S, bool damped, bool fine>
 HOOKE_INLINE void spring_loop(SpringBlock<S>& s) {
   const S *ax = s.a[0], *ay = s.a[1], *az = s.a[2], *bx = s.b[0], *by = s.b[1], *bz = s.b[2];
   const S *k = s.stiffness, *rest = s.rest, *rest2 = s.rest_squared;
   const S *c = s.damping, *vax = s.va[0], *vay = s.va[1], *vaz = s.va[2], *vbx = s.vb[0], *vby = s.vb[1],
           *vbz = s.vb[2];
+  const S *lax = s.low_a[0], *lay = s.low_a[1], *laz = s.low_a[2], *lbx = s.low_b[0], *lby = s.low_b[1],
+          *lbz = s.low_b[2];
   S *fx = s.f[0], *fy = s.f[1], *fz = s.f[2];
   const int n = s.n;
   HOOKE_INDEPENDENT
   for (int i = 0; i < n; ++i) {
-    const S dx = bx[i] - ax[i], dy = by[i] - ay[i], dz = bz[i] - az[i];
+    S dx = bx[i] - ax[i], dy = by[i] - ay[i], dz = bz[i] - az[i];
+    if constexpr (fine) dx += lbx[i] - lax[i], dy += lby[i] - lay[i], dz += lbz[i] - laz[i];
     const S l2 = dx * dx + dy * dy + dz * dz;
     const S root = std::sqrt(l2);
     const S l = root > kTiny<S> ? root : kTiny<S>;
@@ -51,10 +54,10 @@ HOOKE_INLINE void spring_loop(SpringBlock<S>& s) {
 
 template <class S>
 HOOKE_INLINE void springs(SpringBlock<S>& s) {
-  if (s.damping)
-    spring_loop<S, true>(s);
+  if (s.low_a[0])
+    s.damping ? spring_loop<S, true, true>(s) : spring_loop<S, false, true>(s);
   else
-    spring_loop<S, false>(s);
+    s.damping ? spring_loop<S, true, false>(s) : spring_loop<S, false, false>(s);
   if (!s.sum_a[0]) return;
   // Points a and b overlap, so their sums must not share a loop.
   for (int k = 0; k < 3; ++k) add(s.sum_a[k], s.f[k], S(1), s.n);

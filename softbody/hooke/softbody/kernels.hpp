@@ -8,11 +8,13 @@ inline constexpr int kBlock = 128;
 
 /// Springs i in [0, n), n <= kBlock, between points a[i] and b[i], each coordinate a separate
 /// array. f[k][i] becomes the force on a; where sum_a and sum_b are set, it is added to
-/// sum_a[k][i] and taken from sum_b[k][i]. Velocities are null where there is no damping.
+/// sum_a[k][i] and taken from sum_b[k][i]. Velocities are null where there is no damping, and so is what the
+/// rounding of places has dropped where nobody knows it.
 template <class S>
 struct SpringBlock {
   int n;
   const S *a[3], *b[3];
+  const S *low_a[3], *low_b[3];
   const S *va[3], *vb[3];
   const S *stiffness, *rest, *rest_squared, *damping;
   S f[3][kBlock];

@@ -100,7 +100,19 @@ SpringField<S>::SpringField(std::shared_ptr<const SpringNetwork> network, const 
 
 template <class S>
 void SpringField<S>::add_force(const Points<S>& x, const Points<S>& v, double, Points<S>& f) const {
+  add_forces(x, nullptr, v, f);
+}
+
+template <class S>
+void SpringField<S>::add_fine_force(const Points<S>& x, const Points<S>& low, const Points<S>& v, double,
+                                    Points<S>& f) const {
+  add_forces(x, &low, v, f);
+}
+
+template <class S>
+void SpringField<S>::add_forces(const Points<S>& x, const Points<S>* low, const Points<S>& v, Points<S>& f) const {
   SpringBlock<S> block;
+  for (int k = 0; k < 3; ++k) block.low_a[k] = block.low_b[k] = nullptr;
   const auto parameters = [&](Index first, int n) {
     block.n = n;
     block.stiffness = stiffness_.data() + first;
@@ -114,16 +126,18 @@ void SpringField<S>::add_force(const Points<S>& x, const Points<S>& v, double, P
       const Index a = run.a + done, b = run.b + done;
       for (int k = 0; k < 3; ++k) {
         block.a[k] = x.col(k).data() + a, block.b[k] = x.col(k).data() + b;
+        if (low) block.low_a[k] = low->col(k).data() + a, block.low_b[k] = low->col(k).data() + b;
         block.va[k] = v.col(k).data() + a, block.vb[k] = v.col(k).data() + b;
         block.sum_a[k] = f.col(k).data() + a, block.sum_b[k] = f.col(k).data() + b;
       }
       spring_forces(block);
     }
   }
-  S gathered[12][kBlock];
+  S gathered[18][kBlock];
   for (int k = 0; k < 3; ++k) {
     block.a[k] = gathered[k], block.b[k] = gathered[3 + k];
     block.va[k] = gathered[6 + k], block.vb[k] = gathered[9 + k];
+    if (low) block.low_a[k] = gathered[12 + k], block.low_b[k] = gathered[15 + k];
     block.sum_a[k] = block.sum_b[k] = nullptr;
   }
   for (Index first = loose_; first < size(); first += kBlock) {
@@ -132,6 +146,8 @@ void SpringField<S>::add_force(const Points<S>& x, const Points<S>& v, double, P
     parameters(first, n);
     for (int k = 0; k < 3; ++k) {
       for (int i = 0; i < n; ++i) gathered[k][i] = x(a[i], k), gathered[3 + k][i] = x(b[i], k);
+      if (low)
+        for (int i = 0; i < n; ++i) gathered[12 + k][i] = (*low)(a[i], k), gathered[15 + k][i] = (*low)(b[i], k);
       if (damped_)
         for (int i = 0; i < n; ++i) gathered[6 + k][i] = v(a[i], k), gathered[9 + k][i] = v(b[i], k);
     }

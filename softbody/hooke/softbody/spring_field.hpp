@@ -24,6 +24,8 @@ class SpringField final : public ForceField<S> {
   bool uses_velocity() const override { return damped_; }
   bool passive() const override { return true; }
   void add_force(const Points<S>& x, const Points<S>& v, double t, Points<S>& f) const override;
+  void add_fine_force(const Points<S>& x, const Points<S>& low, const Points<S>& v, double t,
+                      Points<S>& f) const override;
   void add_stiffness_times(const Points<S>& x, const Points<S>& d, bool safe, Points<S>& out) const override;
   void add_damping_times(const Points<S>& x, const Points<S>& v, const Points<S>& d, Points<S>& out) const override;
   double potential_energy(const Points<S>& x) const override;
@@ -45,6 +47,7 @@ class SpringField final : public ForceField<S> {
     Index first, count, a, b;
   };
   Index size() const { return stiffness_.size(); }
+  void add_forces(const Points<S>& x, const Points<S>* low, const Points<S>& v, Points<S>& f) const;
 
   std::shared_ptr<const SpringNetwork> network_;
   Points<S> start_;
