@@ -59,7 +59,7 @@ struct Solver {
   double dt = 0;            ///< [s]; 0: automatic
   double tolerance = 1e-6;  ///< of adaptive methods with dt = 0 [m], as MotionSettings::tolerance
   double wanted_error = 0;  ///< of filtered-leapfrog [m], as SoftBodySettings::wanted_error; 0: none
-  softbody::Precision precision = softbody::Precision::Float;
+  softbody::Precision precision = softbody::Precision::Automatic;  // particles: float
 };
 
 struct SoftBody {

@@ -50,7 +50,7 @@ StandardScene particle_scene(bool quadratic) {
       throw std::invalid_argument("particle systems are moved in float or double");
     World world(1);
     world.set_gravity({0, -kGravity, 0});
-    world.add(solver.precision == softbody::Precision::Float ? system_of<float>(solver, quadratic)
+    world.add(solver.precision != softbody::Precision::Double ? system_of<float>(solver, quadratic)
                                                              : system_of<double>(solver, quadratic));
     return world;
   };

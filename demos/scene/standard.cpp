@@ -187,6 +187,7 @@ MotionSettings motion_of(const Solver& solver) {
 template <class Make>
 std::unique_ptr<Body> in_precision(const Solver& solver, const Make& make) {
   switch (solver.precision) {
+    case softbody::Precision::Automatic:
     case softbody::Precision::Float:
       return make(float{});
     case softbody::Precision::Double:

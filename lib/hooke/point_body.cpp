@@ -576,7 +576,7 @@ template <class S>
 double PointBody<S>::unbalanced(const Points<S>& x, Points<S>& left) {
   const Points<S> still = Points<S>::Zero(size(), 3);
   left.resize(size(), 3);
-  acceleration(x, still, tick_.end, left);
+  still_acceleration(x, still, tick_.end, left);
   settle(left);  // as it takes from velocities what surfaces stop, so it does from accelerations
   return double((points_.mass * left.square().rowwise().sum().sqrt()).sum());
 }
@@ -653,7 +653,8 @@ StepReport PointBody<S>::watch_energy(double kinetic) {
   points_.velocity.square().rowwise().sum().maxCoeff(&report.point);
   report.advice = std::to_string(energy_watch_.gain(total)) + " J since it was last given any, " +
                   std::to_string(kinetic) + " J are in its motion, most at this point; " + step_advice();
-  if (finding == EnergyWatch::Finding::Grows) {
+  // Of methods that no step makes stable without damping nobody expects anything else.
+  if (finding == EnergyWatch::Finding::Grows || settings_.method->stability_limit == 0) {
     warn(std::move(report), warned_of_energy_);
     return {};
   }

@@ -117,6 +117,10 @@ class PointBody : public Body, protected Dynamics<S> {
 
   /// One substep; linear rigid bodies add their impacts to it.
   virtual SolveResult substep(double t, double h);
+  /// The acceleration that everything but contacts would give it, were it at rest at x.
+  virtual void still_acceleration(const Points<S>& x, const Points<S>& still, double t, Points<S>& a) {
+    acceleration(x, still, t, a);
+  }
   /// True where its motion dies down by itself.
   virtual bool loses_energy() const;
 

@@ -112,7 +112,7 @@ TEST(Defaults, AreThoseOfTheManual) {
   EXPECT_EQ(scene.tick_rate, 240);
   EXPECT_EQ(scene.damping, 0);
   EXPECT_EQ(scene.bodies[0].solver.method, "velocity-verlet");
-  EXPECT_EQ(scene.bodies[0].solver.precision, softbody::Precision::Float);
+  EXPECT_EQ(scene.bodies[0].solver.precision, softbody::Precision::Automatic);
   const Scene built = build(scene);
   EXPECT_EQ(built.bodies[0].network->springs[0].damping, 0);
   EXPECT_EQ(built.bodies[0].rest[0], 1);

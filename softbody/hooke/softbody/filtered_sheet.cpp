@@ -22,6 +22,7 @@ Index round_up(Index n, Index to) { return (n + to - 1) / to * to; }
 
 MotionSettings with_step(MotionSettings settings, double step) {
   settings.dt = step;
+  settings.watches_energy = false;  // it keeps another energy than that of springs and masses
   return settings;
 }
 
@@ -554,6 +555,14 @@ MotionFacts FilteredSheet<S>::motion_facts() const {
   if (plan_.automatic) out.wanted_dt = 0;
   out.evaluations = evaluations_;
   return out;
+}
+
+template <class S>
+void FilteredSheet<S>::still_acceleration(const Points<S>& x, const Points<S>& still, double t, Points<S>& a) {
+  Base::acceleration(x, still, t, a);
+  Points<S> force = Points<S>::Zero(x.rows(), 3);
+  field_.add_force(x, still, t, force);
+  a += force.colwise() * points_.inverse_mass;
 }
 
 template <class S>

@@ -57,8 +57,14 @@ class FilteredSheet final : public PointBody<S> {
   void describe(Blueprint& out) const override;
   void save(CheckpointWriter& out) const override;
   void load(CheckpointReader& in) override;
+  void wake() override {
+    Base::wake();
+    known_ = false;
+  }
 
  protected:
+  void still_acceleration(const Points<S>& x, const Points<S>& still, double t, Points<S>& a) override;
+  bool loses_energy() const override { return damped_ || Base::loses_energy(); }
   SolveResult substep(double t, double h) override;
 
  private:

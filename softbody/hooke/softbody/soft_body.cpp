@@ -3,6 +3,8 @@
 #include <hooke/softbody/spring_field.hpp>
 #include <hooke/softbody/volume_field.hpp>
 
+#include <cmath>
+#include <limits>
 #include <stdexcept>
 
 namespace hooke::softbody {
@@ -48,14 +50,24 @@ std::unique_ptr<Body> make(const SoftBodySettings& s) {
 }  // namespace
 
 Precision precision_named(std::string_view name) {
-  for (const Precision precision : {Precision::Float, Precision::Double, Precision::DoubleFloat})
+  for (const Precision precision : {Precision::Automatic, Precision::Float, Precision::Double, Precision::DoubleFloat})
     if (precision_name(precision) == name) return precision;
   throw std::invalid_argument("no precision is called \"" + std::string(name) +
-                              "\"; there are float, double, double-float");
+                              "\"; there are automatic, float, double, double-float");
 }
 
 std::string_view precision_name(Precision precision) {
-  return precision == Precision::Float ? "float" : precision == Precision::Double ? "double" : "double-float";
+  switch (precision) {
+    case Precision::Automatic:
+      return "automatic";
+    case Precision::Float:
+      return "float";
+    case Precision::Double:
+      return "double";
+    case Precision::DoubleFloat:
+      break;
+  }
+  return "double-float";
 }
 
 namespace {
@@ -80,8 +92,34 @@ SoftBodySettings settings_of(const Lattice& lattice) {
   return settings;
 }
 
+Precision resolved_precision(const SoftBodySettings& s) {
+  if (s.precision != Precision::Automatic) return s.precision;
+  const Method& method = *s.motion.method;
+  const bool loses = (!method.symplectic && method.stability_limit == std::numeric_limits<double>::infinity()) ||
+                     s.wind || s.linear_drag != 0 || s.quadratic_drag != 0;
+  if (loses || !s.network || s.network->springs.empty() || s.masses.size() != s.positions.rows())
+    return Precision::Float;
+  double stiffness = 0;
+  for (const Spring& spring : s.network->springs) {
+    if (spring.damping > 0) return Precision::Float;
+    stiffness += 2 * spring.stiffness;  // at both ends
+  }
+  const SpringField<double> field(s.network, s.positions);
+  const double omega = std::sqrt(
+      field.rate_bounds(s.positions, Points<double>::Zero(s.positions.rows(), 3), s.masses.inverse()).omega_squared);
+  const double h = s.motion.dt > 0 ? s.motion.dt : 0.9 * largest_stable_step(method, omega, 0);
+  const double size = (s.positions.colwise().maxCoeff() - s.positions.colwise().minCoeff()).matrix().norm();
+  const double rounding = double(std::numeric_limits<float>::epsilon()) * s.positions.abs().maxCoeff() / std::sqrt(12);
+  constexpr double kMinute = 60, kMeasured = 1.0 / 6, kGravity = 9.81, kShare = 1e-3;
+  const double heat = kMinute * kMeasured * 1.5 * stiffness * rounding * rounding / h;
+  // A sheet that swings down exchanges about a seventh of its weight times its size.
+  return heat > kShare * 0.15 * s.masses.sum() * kGravity * size ? Precision::Double : Precision::Float;
+}
+
 std::unique_ptr<Body> make_soft_body(const SoftBodySettings& settings) {
-  return settings.precision == Precision::Float ? make<float>(settings) : make<double>(settings);
+  SoftBodySettings s = settings;
+  s.precision = resolved_precision(settings);
+  return s.precision == Precision::Float ? make<float>(s) : make<double>(s);
 }
 
 }  // namespace hooke::softbody

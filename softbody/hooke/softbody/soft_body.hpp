@@ -15,9 +15,13 @@ namespace hooke::softbody {
 /// In double-float, positions and velocities are held in two floats each: on undamped springs of a grid,
 /// by splitting methods; for machines that are slow at double. The body's own numbers are double then; ticks with
 /// contacts or driven pins are computed in double.
-enum class Precision { Float, Double, DoubleFloat };
+///
+/// Automatic is float, or double for undamped springs so stiff that float's rounding would heat them: where the
+/// gain expected in a minute is above a thousandth of the energy that a fall over the body's size exchanges. Every
+/// substep rounds positions by δ, which costs ½ k δ² a spring: Σ k δ² / h in a second, of which a sixth was measured.
+enum class Precision { Automatic, Float, Double, DoubleFloat };
 
-/// The precision of that name: float, double, double-float.
+/// The precision of that name: automatic, float, double, double-float.
 /// @throws std::invalid_argument that lists them
 Precision precision_named(std::string_view name);
 std::string_view precision_name(Precision precision);
@@ -38,8 +42,11 @@ struct SoftBodySettings {
   double quadratic_drag = 0;                     ///< on every point [N·s²/m²]
   MotionSettings motion;                         ///< method: those of method.hpp, or filtered_leapfrog()
   double wanted_error = 0;                       ///< of filtered leapfrog [m]; may lower the stiffness; 0: none
-  Precision precision = Precision::Float;
+  Precision precision = Precision::Automatic;
 };
+
+/// What Automatic stands for in a body of these settings; any other precision as it is.
+Precision resolved_precision(const SoftBodySettings& settings);
 
 /// Takes points, masses, springs and triangles from a cloth.
 SoftBodySettings settings_of(const Cloth& cloth);
