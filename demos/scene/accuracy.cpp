@@ -91,7 +91,8 @@ ErrorEstimate estimate_errors(const Scene& like) {
     const Body& body = *run.bodies[i].body;
     const double seen = rms(body.positions(), half.bodies[i].body->positions());
     const std::string& name = finer.bodies[i].solver.method;
-    const int full = name == softbody::filtered_leapfrog().name ? 1 : method_named(name).order;
+    const int full =
+        name == softbody::filtered_leapfrog().name || name == softbody::xpbd().name ? 1 : method_named(name).order;
     const int order = description.colliders.empty() ? full : 1;
     const double growth =
         midway[i] > 0 && seen > 0 ? std::clamp(std::log2(seen / midway[i]), kLeastGrowth, kMostGrowth) : 1;

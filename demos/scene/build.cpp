@@ -51,8 +51,9 @@ softbody::Cloth cloth_of(const Grid& grid, const Material& material) {
 
 // Of the core, or of soft bodies alone.
 const Method& method_of(const std::string& name) {
-  const Method& filtered = softbody::filtered_leapfrog();
-  return name == filtered.name ? filtered : method_named(name);
+  for (const Method* method : {&softbody::filtered_leapfrog(), &softbody::xpbd()})
+    if (name == method->name) return *method;
+  return method_named(name);
 }
 
 struct Lattice {
@@ -227,6 +228,7 @@ class Builder {
     settings.motion.thickness = description.thickness;
     settings.motion.dt = description.solver.dt;
     settings.motion.tolerance = description.solver.tolerance;
+    settings.motion.iterations = description.solver.iterations;
     settings.motion.method = &method_of(description.solver.method);
     settings.wanted_error = description.solver.wanted_error;
     settings.precision = description.solver.precision;
@@ -344,6 +346,7 @@ void override_solver(SceneDescription& description, const std::string& method, d
     if (!method.empty() || dt > 0 || !precision.empty()) body.solver.error = 0;
     if (!method.empty()) body.solver.method = method;
     if (dt > 0 || body.solver.method != softbody::filtered_leapfrog().name) body.solver.wanted_error = 0;
+    if (body.solver.method != softbody::xpbd().name) body.solver.iterations = 0;
     if (dt > 0) body.solver.dt = dt;
     if (!precision.empty()) body.solver.precision = softbody::precision_named(precision);
   }

@@ -58,6 +58,7 @@ struct Solver {
   std::string method = "velocity-verlet";
   double dt = 0;            ///< [s]; 0: automatic
   double tolerance = 1e-6;  ///< of adaptive methods with dt = 0 [m], as MotionSettings::tolerance
+  int iterations = 0;       ///< of xpbd, as MotionSettings::iterations; 0: its default
   double wanted_error = 0;  ///< of filtered-leapfrog [m], as SoftBodySettings::wanted_error; 0: none
   softbody::Precision precision = softbody::Precision::Automatic;  // particles: float
 };

@@ -186,7 +186,7 @@ softbody::Wind read_wind(const Object& object) {
 Solver read_solver(const Object& object) {
   Solver solver;
   if (const auto error = object.find("error")) {
-    for (const char* key : {"method", "dt", "wanted_error", "precision"})
+    for (const char* key : {"method", "dt", "wanted_error", "iterations", "precision"})
       if (object.has(key)) object[key].fail("is chosen where an \"error\" is wanted; give one or the other");
     solver.error = error->number(Range::positive());
     return solver;
@@ -194,6 +194,7 @@ Solver read_solver(const Object& object) {
   std::vector<std::string> names;
   for (const Method* method : methods()) names.emplace_back(method->name);
   names.emplace_back(softbody::filtered_leapfrog().name);
+  names.emplace_back(softbody::xpbd().name);
   if (const auto method = object.find("method")) solver.method = method->choice(names);
   solver.dt = object.number("dt", solver.dt, Range::positive(), "s");
   if (const auto error = object.find("wanted_error")) {
@@ -201,6 +202,10 @@ Solver read_solver(const Object& object) {
       error->fail("is for filtered-leapfrog, got the method " + solver.method);
     if (solver.dt > 0) error->fail("excludes dt");
     solver.wanted_error = error->number(Range::positive(), "m");
+  }
+  if (const auto iterations = object.find("iterations")) {
+    if (solver.method != softbody::xpbd().name) iterations->fail("is for xpbd, got the method " + solver.method);
+    solver.iterations = int(iterations->whole(1, 1000));
   }
   if (const auto precision = object.find("precision"))
     solver.precision = softbody::precision_named(precision->choice({"float", "double", "double-float"}));

@@ -514,9 +514,12 @@ TYPED_TEST(Contact, PlanesTellHowFarAPointMayGo) {
                                      {"user's", {}, {}, all, 0.2, 0}};
   const auto planes = planes_of<S>(colliders, points, 0, kStep, S(0.05));
   ASSERT_EQ(planes.size(), 4u);
-  for (const auto& plane : planes) {
+  // Between samples, trilinear interpolation is off by up to voxel² / (4 r) in a ball.
+  constexpr double kSampled = 0.02 * 0.02 / (4 * 0.5);
+  for (std::size_t i = 0; i < planes.size(); ++i) {
+    const auto& plane = planes[i];
     EXPECT_EQ(plane.point, 0);
-    EXPECT_NEAR(plane.gap, 0.003, 1e-4);
+    EXPECT_NEAR(plane.gap, 0.003, i == 2 ? kSampled : 1e-6) << i;
     EXPECT_NEAR(plane.normal[1], 1, 1e-3);
     EXPECT_EQ(plane.carried.norm(), S(0));
   }

@@ -28,10 +28,18 @@ std::unique_ptr<Body> make(const SoftBodySettings& s) {
   if (s.wanted_error != 0 && !filtered)
     throw std::invalid_argument("body \"" + s.name + "\": only filtered-leapfrog takes a wanted error, got method " +
                                 std::string(s.motion.method->name));
-  auto body = filtered ? make_filtered_sheet(s.name, std::move(points), s.motion, s.network, s.wanted_error)
-                       : std::make_unique<PointBody<S>>(s.name, std::move(points), s.motion);
+  const bool projected = s.motion.method == &xpbd();
+  if (s.motion.iterations != 0 && !projected)
+    throw std::invalid_argument("body \"" + s.name + "\": only xpbd takes iterations, got method " +
+                                std::string(s.motion.method->name));
+  if (projected && s.volume_stiffness != 0)
+    throw std::invalid_argument("body \"" + s.name + "\": xpbd moves springs alone and keeps no volume, got " +
+                                std::to_string(s.volume_stiffness) + " Pa for it. Take another method");
+  auto body = filtered    ? make_filtered_sheet(s.name, std::move(points), s.motion, s.network, s.wanted_error)
+              : projected ? make_xpbd_body(s.name, std::move(points), s.motion, s.network)
+                          : std::make_unique<PointBody<S>>(s.name, std::move(points), s.motion);
   for (const Index pin : s.pins) body->pin(pin);
-  if (!filtered && s.network && !s.network->springs.empty())
+  if (!filtered && !projected && s.network && !s.network->springs.empty())
     body->add_field(
         std::make_unique<SpringField<S>>(s.network, body->state().position, s.precision == Precision::DoubleFloat));
   if (s.volume_stiffness != 0)

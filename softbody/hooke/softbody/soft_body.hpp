@@ -6,6 +6,7 @@
 #include <hooke/softbody/filtered_leapfrog.hpp>
 #include <hooke/softbody/lattice.hpp>
 #include <hooke/softbody/wind.hpp>
+#include <hooke/softbody/xpbd.hpp>
 
 #include <optional>
 #include <string_view>
@@ -40,7 +41,7 @@ struct SoftBodySettings {
   std::optional<Wind> wind;                      ///< absent: no air at all
   double linear_drag = 0;                        ///< on every point [N·s/m]
   double quadratic_drag = 0;                     ///< on every point [N·s²/m²]
-  MotionSettings motion;                         ///< method: those of method.hpp, or filtered_leapfrog()
+  MotionSettings motion;                         ///< method: those of method.hpp, filtered_leapfrog() or xpbd()
   double wanted_error = 0;                       ///< of filtered leapfrog [m]; may lower the stiffness; 0: none
   Precision precision = Precision::Automatic;
 };
