@@ -132,13 +132,13 @@ double hang(const SoftBodySettings& settings, double seconds) {
 }
 
 TYPED_TEST(Xpbd, StiffnessMeansTheSameAtAnyIterationCountAndSubstep) {
-  const SoftBodySettings settings = in(kPrecision<TypeParam>, sheet(12, false));
-  const double extension = hang(settings, 8);  // by velocity Verlet
+  const SoftBodySettings settings = in(kPrecision<TypeParam>, sheet(8, false));
+  const double extension = hang(sheet(8, false), 6);  // by velocity Verlet in double
   for (const int iterations : {1, 4, 16})
     for (const int substeps : {20, 80}) {
       if (iterations == 16 && substeps == 80) continue;  // the dearest
       SCOPED_TRACE(std::to_string(iterations) + " iterations, " + std::to_string(substeps) + " substeps");
-      EXPECT_NEAR(hang(projected(settings, kFrame / substeps, iterations), 8), extension, 0.01 * extension);
+      EXPECT_NEAR(hang(projected(settings, kFrame / substeps, iterations), 6), extension, 0.01 * extension);
     }
 }
 
@@ -264,19 +264,23 @@ TYPED_TEST(Xpbd, SticksToASlopeBelowTheAngleOfFriction) {
 }
 
 TYPED_TEST(Xpbd, SagOnAFloorIsTheStaticOne) {
-  const SoftBodySettings settings = in(kPrecision<TypeParam>, cube(4, 0.2, 1, 500, 1));
-  const auto sag = [&](const SoftBodySettings& moved) {
-    Play play(moved);
-    play.colliders = {floor_at({0, 1, 0}, 0)};
+  // On a floor that nothing slides on, the lowest points are as good as held.
+  SoftBodySettings held = cube(4, 0.2, 1, 500, 1);
+  for (int i = 0; i < 4; ++i)
+    for (int k = 0; k < 4; ++k) held.pins.push_back(16 * i + k);
+  const auto sag = [](const SoftBodySettings& settings, bool on_floor) {
+    Play play(settings);
+    if (on_floor) play.colliders = {floor_at({0, 1, 0}, 10)};
     play.lost_a_second = 0.9;
     play.run(6);
     EXPECT_LT(play.fastest(), 1e-4);
     return -play.body->displacement()[1];
   };
-  const double wanted = sag(settings);
+  const double wanted = sag(held, false);
   EXPECT_GT(wanted, 1e-4);
-  EXPECT_NEAR(sag(projected(settings, 0, 1)), wanted, 0.01 * wanted);
-  EXPECT_NEAR(sag(projected(settings)), wanted, 0.01 * wanted);
+  const SoftBodySettings settings = in(kPrecision<TypeParam>, cube(4, 0.2, 1, 500, 1));
+  EXPECT_NEAR(sag(projected(settings, 0, 1), true), wanted, 0.01 * wanted);
+  EXPECT_NEAR(sag(projected(settings), true), wanted, 0.01 * wanted);
 }
 
 TYPED_TEST(Xpbd, IsBoundedAtAnyStiffness) {
@@ -309,7 +313,7 @@ TYPED_TEST(Xpbd, IsBoundedWhenOverstretched) {
 }
 
 TYPED_TEST(Xpbd, HeavyEndHangsWhereItShould) {
-  const double g = 9.81, mass = 1e-3, stiffness = 5e3;
+  const double g = 9.81, mass = 1e-3, stiffness = 10;
   for (const double ratio : {1e2, 1e4}) {
     const SoftBodySettings settings = in(kPrecision<TypeParam>, chain(10, stiffness * ratio, mass, 0.1, ratio * mass));
     Play play(projected(settings));

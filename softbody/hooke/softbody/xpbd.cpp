@@ -22,8 +22,8 @@ constexpr double kFollow = 0.3;
 constexpr double kQuiet = 0.02, kQuietTime = 0.5;
 // … and otherwise as far as it brings in no more than this share of what is lost.
 constexpr double kShareOfLoss = 0.5;
-// A carried force acts along a fixed direction, which is stable across it up to about l / (h² (w_a + w_b)).
-constexpr double kLargestCarried = 1;
+// The largest carried force, in l / (h² (w_a + w_b)).
+constexpr double kLargestCarried = 30;
 
 template <class S>
 struct alignas(4 * sizeof(S)) Record {  // a point: coordinates and inverse mass
@@ -266,16 +266,21 @@ void XpbdBody<S>::push_by_carried() {
     }
     Record<S>&a = way[link.a], &b = way[link.b];
     const Record<S>&from = start[link.a], &to = start[link.b];
-    const S dx = to.x - from.x + (b.x - a.x), dy = to.y - from.y + (b.y - a.y), dz = to.z - from.z + (b.z - a.z);
-    const S length = std::sqrt(dx * dx + dy * dy + dz * dz);
     const S inertia = a.w + b.w;  // times h²
+    const S dx = to.x - from.x, dy = to.y - from.y, dz = to.z - from.z;
+    const S square = dx * dx + dy * dy + dz * dz, length = std::sqrt(square);
     S f = carried[i] + follow * (force[i] - carried[i]);
     const S most = inertia > 0 ? limit * length / inertia : S(0);
     f = std::clamp(f, -most, most);
     carried[i] = force[i] = f;
-    const S share = length > 0 ? f / length : S(0);
-    a.x += a.w * share * dx, a.y += a.w * share * dy, a.z += a.w * share * dz;
-    b.x -= b.w * share * dx, b.y -= b.w * share * dy, b.z -= b.w * share * dz;
+    if (!(length > 0)) continue;
+    // Along the spring as it will be at the end: across, the pull itself brings the ends back into line.
+    const S mx = b.x - a.x, my = b.y - a.y, mz = b.z - a.z;
+    const S turn = 1 / (length + std::max(f, S(0)) * inertia);
+    const S share = f * (1 / length - turn * (dx * mx + dy * my + dz * mz) / square), across = f * turn;
+    const S fx = share * dx + across * mx, fy = share * dy + across * my, fz = share * dz + across * mz;
+    a.x += a.w * fx, a.y += a.w * fy, a.z += a.w * fz;
+    b.x -= b.w * fx, b.y -= b.w * fy, b.z -= b.w * fz;
   }
 }
 
