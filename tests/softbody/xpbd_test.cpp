@@ -6,6 +6,7 @@
 #include <hooke/softbody/soft_body.hpp>
 
 #include <Eigen/Geometry>
+#include <sstream>
 
 namespace hooke::test {
 namespace {
@@ -349,6 +350,28 @@ TYPED_TEST(Xpbd, CoincidentPointsAndZeroLengthsStayFinite) {
   Play play(projected(settings, 0, 1));
   play.run(2);
   EXPECT_LT(play.body->positions().abs().maxCoeff(), 1);
+}
+
+TEST(XpbdBody, GoesOnFromACheckpointWithTheSameBits) {
+  const auto make = [](World& world) -> Body& {
+    world.add_collider(floor_at({0, 1, 0}, 0.3));
+    SoftBodySettings settings = projected(in(Precision::Float, cube(4, 0.2, 1, 2000, 1)), 0, 2);
+    settings.positions.col(1) += 0.01;
+    return world.add(make_soft_body(settings));
+  };
+  World whole(240), resumed(240);
+  const Body &one = make(whole), &other = make(resumed);
+  const auto run = [](World& world) {
+    for (int i = 0; i < 20; ++i) ASSERT_TRUE(world.update(kFrame).good());
+  };
+  run(whole);
+  std::stringstream file;
+  whole.save(file);
+  resumed.load(file);
+  run(whole);
+  run(resumed);
+  EXPECT_TRUE((one.positions() == other.positions()).all());
+  EXPECT_TRUE((one.velocities() == other.velocities()).all());
 }
 
 TEST(XpbdBody, TellsWhatWasUsedAndRefusesWhatItCannot) {

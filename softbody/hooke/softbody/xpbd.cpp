@@ -99,6 +99,37 @@ class XpbdBody final : public PointBody<S> {
     Base::drive_pins(std::move(points), std::move(motion));
     gain_step_ = 0;
   }
+  void describe(Blueprint& out) const override {
+    Base::describe(out);
+    out.add("iterations", Index(this->settings().iterations));
+    if (field_) field_->describe(out);
+  }
+  void save(CheckpointWriter& out) const override {
+    Base::save(out);
+    out.begin("xpbd");
+    out.add(low_);
+    out.add(memory_.force);
+    out.add(memory_.carried);
+    for (const double value : {memory_.follow, memory_.kinetic, memory_.lost, memory_.held}) out.add(value);
+    out.add(std::int64_t(memory_.substeps));
+    out.add(sweeps_);
+    out.end();
+  }
+  void load(CheckpointReader& in) override {
+    Base::load(in);
+    in.begin("xpbd");
+    in.array("rounding of positions", low_, points_.size());
+    in.array("forces", memory_.force, Index(links_.size()));
+    in.array("carried forces", memory_.carried, Index(links_.size()));
+    memory_.follow = in.number<double>("share that follows", 0, 1);
+    memory_.kinetic = in.number<double>("kinetic energy", 0);
+    memory_.lost = in.number<double>("lost energy", 0);
+    memory_.held = in.number<double>("held energy", 0);
+    memory_.substeps = Index(in.number<std::int64_t>("substeps", 0));
+    sweeps_ = in.number<std::int64_t>("sweeps", 0);
+    in.end();
+    gain_step_ = 0;
+  }
   StepReport advance(const Tick& tick) override {
     before_ = memory_;
     before_low_ = low_;

@@ -16,8 +16,9 @@ namespace hooke::softbody {
 /// the state at rest is the static one at any number of iterations; before that, springs that are
 /// stiffer than the sweeps can follow, h² k (1/m_a + 1/m_b) above about 1, are softer. Springs' damping is in N·s/m
 /// and takes nothing from free fall. Contacts and friction are solved in the sweeps, drag and wind act as
-/// explicit forces. Only bodies of make_soft_body can be moved by it. Cost: about 5 ns a spring and sweep.
-/// Source: Macklin, Müller, Chentanez, "XPBD", MIG 2016; Macklin et al., "Small steps in physics simulation", SCA 2019.
+/// explicit forces. Only bodies of make_soft_body can be moved by it. Cost: a square root and a division a spring and
+/// sweep. Source: Macklin, Müller, Chentanez, "XPBD", MIG 2016; Macklin et al., "Small steps in physics simulation",
+/// SCA 2019.
 const Method& xpbd();
 
 /// Makes such a body. settings.dt = 0 takes substeps of 1/1200 s.
