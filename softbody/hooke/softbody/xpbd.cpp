@@ -22,8 +22,8 @@ constexpr double kFollow = 0.3;
 constexpr double kQuiet = 0.02, kQuietTime = 0.5;
 // … and otherwise as far as it brings in no more than this share of what is lost.
 constexpr double kShareOfLoss = 0.5;
-// The largest carried force, in l / (h² (w_a + w_b)).
-constexpr double kLargestCarried = 30;
+// The largest carried force, in l / (h² (w_a + w_b)); at 30, a heavy corner at steps of 1/60 s grew without bound.
+constexpr double kLargestCarried = 2;
 
 template <class S>
 struct alignas(4 * sizeof(S)) Record {  // a point: coordinates and inverse mass
