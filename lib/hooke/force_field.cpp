@@ -31,6 +31,9 @@ template <class S>
 void ForceField<S>::add_damping_times(const Points<S>&, const Points<S>&, const Points<S>&, Points<S>&) const {}
 
 template <class S>
+void ForceField<S>::add_couplings(const Points<S>&, const Points<S>&, double, std::vector<Coupling>&) const {}
+
+template <class S>
 double ForceField<S>::potential_energy(const Points<S>&) const {
   return 0;
 }

@@ -2,6 +2,7 @@
 // acceleration and belongs to the world. Springs and wind are in hooke::softbody.
 #pragma once
 
+#include <hooke/block_cholesky.hpp>
 #include <hooke/checkpoint.hpp>
 #include <hooke/stepper.hpp>
 #include <hooke/types.hpp>
@@ -42,6 +43,10 @@ class ForceField {
 
   /// out += D d, where D = -∂f/∂v [N·s/m], or a positive approximation of it.
   virtual void add_damping_times(const Points<S>& x, const Points<S>& v, const Points<S>& d, Points<S>& out) const;
+
+  /// Appends h²K + hD, negative eigenvalues left out, as blocks between points, always in the same order. Implicit
+  /// methods precondition with it: a field that adds nothing is solved as well, with more products.
+  virtual void add_couplings(const Points<S>& x, const Points<S>& v, double h, std::vector<Coupling>& out) const;
 
   /// Potential energy [J]; 0 for forces that have none.
   virtual double potential_energy(const Points<S>& x) const;

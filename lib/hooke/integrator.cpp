@@ -11,22 +11,9 @@ namespace hooke {
 
 namespace {
 
-// Speeds below this count as none [m/s]: their squares leave the range of double.
-template <class S>
-constexpr double kStandstill = std::is_same_v<S, float> ? 1e-20 : 1e-100;
-
-// How often compressed springs are met with the positive part of their stiffness.
-constexpr int kSafeIterations = 10;
-
 // Step control: exponents of this and the last error (PI, β = 0.04), what is kept of the step that they
 // suggest, and the most that a step may shrink and grow.
 constexpr double kPiBeta = 0.04, kStepShare = 0.9, kMostShrink = 0.2, kMostGrowth = 5;
-
-template <class S>
-double tolerance_of(const Implicit& scheme) {
-  const double least = std::is_same_v<S, float> ? 1e-6 : 1e-12;
-  return std::max(scheme.tolerance, least);
-}
 
 }  // namespace
 
@@ -68,13 +55,6 @@ template <class S>
 void Integrator<S>::evaluate(Dynamics<S>& dynamics, const Points<S>& x, const Points<S>& v, double t, Points<S>& a) {
   ++work_.evaluations;
   dynamics.acceleration(x, v, t, a);
-}
-
-// product_ += (h²K + hD) direction_.
-template <class S>
-void Integrator<S>::multiply(Dynamics<S>& dynamics, const Points<S>& x, const Points<S>& v, S h, bool safe) {
-  ++work_.products;
-  dynamics.add_implicit_times(x, v, h, safe, direction_, product_);
 }
 
 // sum += factor addend. What the sum's rounding drops waits in `low`.
@@ -347,153 +327,30 @@ SolveResult Integrator<S>::run(const Nystrom& table, Dynamics<S>& dynamics, Poin
   return {};
 }
 
-// (M + h²K + hD) solution = right on the free points, by conjugate gradients with M as
-// preconditioner: errors count as velocities, so light points next to heavy ones are solved
-// as well as those. Returns false where the matrix shows a direction of negative curvature (only possible without
-// `safe`).
 template <class S>
-bool Integrator<S>::solve_linear(Dynamics<S>& dynamics, S h, bool safe, double tolerance, const Points<S>& x,
-                                 const Points<S>& v, const Points<S>& right, Points<S>& solution) {
-  const Values<S>& mass = dynamics.mass();
-  const Values<S>& inverse_mass = dynamics.inverse_mass();
-  const auto hold = [&](Points<S>& p) {
-    for (int k = 0; k < 3; ++k) p.col(k) = (inverse_mass == S(0)).select(S(0), p.col(k));
-  };
-  const auto precondition = [&] {
-    preconditioned_.resize(x.rows(), 3);
-    for (int k = 0; k < 3; ++k) preconditioned_.col(k) = inverse_mass * residual_.col(k);
-  };
-  const auto dot = [](const Points<S>& p, const Points<S>& q) {
-    return (p.template cast<double>() * q.template cast<double>()).sum();
-  };
-  solution.setZero(x.rows(), 3);
-  residual_ = right;
-  hold(residual_);
-  precondition();
-  direction_ = preconditioned_;
-  double slope = dot(residual_, preconditioned_), size = dot(preconditioned_, preconditioned_);
-  const double target = size * tolerance * tolerance;
-  const Index limit = 10 * 3 * x.rows() + 100;
-  for (Index i = 0; i < limit && size > target && slope > 0; ++i) {
-    product_.resize(x.rows(), 3);
-    for (int k = 0; k < 3; ++k) product_.col(k) = mass * direction_.col(k);
-    multiply(dynamics, x, v, h, safe);
-    hold(product_);
-    const double curvature = dot(direction_, product_);
-    if (!(curvature > 0)) return false;
-    const double alpha = slope / curvature;
-    solution += S(alpha) * direction_;
-    residual_ -= S(alpha) * product_;
-    precondition();
-    const double next = dot(residual_, preconditioned_);
-    direction_ = preconditioned_ + S(next / slope) * direction_;
-    slope = next;
-    size = dot(preconditioned_, preconditioned_);
-  }
-  return true;
-}
-
-// How much h a at (stage_x_, stage_v_) moves when every coordinate is off by its rounding.
-template <class S>
-double Integrator<S>::rounding_of_force(Dynamics<S>& dynamics, S h) {
-  if (stage_x_.size() == 0) return 0;
-  // Neighbours must err in different directions: signs from the bits of a multiplied index.
-  direction_ = (std::numeric_limits<S>::epsilon() / h) * stage_x_.abs();
-  for (Index i = 0; i < direction_.size(); ++i)
-    if ((std::uint32_t(i) * 2654435761u) >> 31) direction_.data()[i] *= S(-1);
-  product_.setZero(stage_x_.rows(), 3);
-  multiply(dynamics, stage_x_, stage_v_, h, true);
-  for (int k = 0; k < 3; ++k) product_.col(k) *= dynamics.inverse_mass();
-  const double found = double(product_.abs().maxCoeff());
-  return std::isfinite(found) ? found : 0;
-}
+void Dynamics<S>::add_couplings(const Points<S>&, const Points<S>&, double, std::vector<Coupling>&) {}
 
 template <class S>
 SolveResult Integrator<S>::run(const Implicit& scheme, Dynamics<S>& dynamics, Points<S>& x, Points<S>& v, double t,
                                double h) {
-  const double tolerance = tolerance_of<S>(scheme);
-  const Values<S>& mass = dynamics.mass();
-  const Values<S>& inverse_mass = dynamics.inverse_mass();
   // With u = vθ and the end at t + θh both unknowns are those of a backward Euler step of θh.
   const double solved = scheme.theta * h;
-  const S step = S(solved);
   from_ = x;
-  // Where the step would end with velocity u, and by how much u misses v + h a there.
-  const auto miss = [&](Points<S>& u, Points<S>& end, Points<S>& out) {
-    end = from_ + step * u;
-    if (dynamics.prescribes()) dynamics.prescribe(t, from_, t + solved, end, u);
-    evaluate(dynamics, end, u, t + solved, acceleration_);
-    out = v + step * acceleration_ - u;
-    for (int k = 0; k < 3; ++k) out.col(k) = (inverse_mass == S(0)).select(S(0), out.col(k));
-    if (out.size() == 0) return 0.0;
-    // A maximum may pass over a NaN.
-    return out.allFinite() ? double(out.abs().maxCoeff()) : std::numeric_limits<double>::quiet_NaN();
-  };
-  stage_v_ = v;
-  double residual = miss(stage_v_, stage_x_, right_);
-  double rounding = -1;
-  SolveResult result;
-  for (int iteration = 0;; ++iteration) {
-    const double scale = std::max({double(stage_v_.abs().maxCoeff()), double(v.abs().maxCoeff()),
-                                   solved * double(acceleration_.abs().maxCoeff()), kStandstill<S>});
-    result.residual = residual / scale;
-    result.converged = scheme.linearised ? residual == 0 : result.residual <= tolerance;
-    if (result.converged || iteration == scheme.max_iterations || !std::isfinite(residual)) break;
-    for (int k = 0; k < 3; ++k) right_.col(k) *= mass;
-    if (scheme.linearised) {
-      if (!solve_linear(dynamics, step, false, tolerance, stage_x_, stage_v_, right_, update_))
-        solve_linear(dynamics, step, true, tolerance, stage_x_, stage_v_, right_, update_);
-      stage_v_ += update_;
-      result.converged = true;
-      break;
-    }
-    // The exact stiffness converges quadratically but may be indefinite in compressed springs.
-    const double inner = std::clamp(0.01 * result.residual, 0.1 * tolerance, 1e-3);
-    // Where it is, the positive part alone leads downhill far away, and what the gradients found
-    // before they met the negative direction leads home.
-    const bool positive = solve_linear(dynamics, step, false, inner, stage_x_, stage_v_, right_, update_);
-    if (!positive && (iteration < kSafeIterations || (update_ == S(0)).all()))
-      solve_linear(dynamics, step, true, inner, stage_x_, stage_v_, right_, update_);
-    // The step minimises an energy whose slope along the update is minus this product. A step is
-    // good where the energy still falls or has just turned, however the residual jumps meanwhile.
-    const auto slope = [&](const Points<S>& force) {
-      return (force.template cast<double>() * update_.template cast<double>()).sum();
-    };
-    const double first_slope = slope(right_);
-    double best = std::numeric_limits<double>::infinity();
-    S length = 1;
-    for (int halving = 0; halving < 12; ++halving, length *= S(0.5)) {
-      trial_v_ = stage_v_ + length * update_;
-      best = miss(trial_v_, trial_x_, right_);
-      if (best < residual) break;
-      for (int k = 0; k < 3; ++k) product_.col(k) = mass * right_.col(k);
-      if (std::isfinite(best) && slope(product_) > -0.9 * first_slope) break;
-    }
-    if (iteration > 1 && !(best < 0.5 * residual)) {
-      // Large forces that balance leave a rest that is nothing but the rounding of positions.
-      if (rounding < 0) rounding = rounding_of_force(dynamics, step);
-      if (residual <= std::max(100 * tolerance * scale, rounding)) {
-        result.converged = true;
-        miss(stage_v_, stage_x_, right_);
-        break;
-      }
-    }
-    stage_v_ = trial_v_;
-    stage_x_ = trial_x_;
-    residual = best;
-  }
+  const SolveResult result = solver_.solve(scheme, dynamics, x, v, t, solved, work_);
   if (scheme.theta == 1 && !scheme.linearised) {
-    x = stage_x_;
-    v = stage_v_;
+    x = solver_.position();
+    v = solver_.velocity();
   } else {
-    x = from_ + S(h) * stage_v_;
-    v += (stage_v_ - v) / S(scheme.theta);
+    x = from_ + S(h) * solver_.velocity();
+    v += (solver_.velocity() - v) / S(scheme.theta);
     if (dynamics.prescribes()) dynamics.prescribe(t, from_, t + h, x, v);
   }
   if (dynamics.collides()) dynamics.collide(t, from_, t + h, x, v);
   return result;
 }
 
+template class Dynamics<float>;
+template class Dynamics<double>;
 template class Integrator<float>;
 template class Integrator<double>;
 

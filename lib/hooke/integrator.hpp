@@ -3,6 +3,7 @@
 #pragma once
 
 #include <hooke/checkpoint.hpp>
+#include <hooke/implicit_solver.hpp>
 #include <hooke/method.hpp>
 #include <hooke/types.hpp>
 
@@ -46,6 +47,9 @@ class Dynamics {
   /// out += h² K d + h D d at (x, v).
   virtual void add_implicit_times(const Points<S>& x, const Points<S>& v, S h, bool safe, const Points<S>& d,
                                   Points<S>& out) = 0;
+  /// Appends h²K + hD at (x, v), negative eigenvalues left out, as far as it is known as blocks: what implicit
+  /// methods precondition with.
+  virtual void add_couplings(const Points<S>& x, const Points<S>& v, double h, std::vector<Coupling>& out);
 };
 
 /// How an implicit solve went; explicit methods always converge.
@@ -59,6 +63,7 @@ struct SolveResult {
 struct Work {
   std::int64_t evaluations = 0;  ///< of the accelerations of all points
   std::int64_t products = 0;     ///< of h²K + hD with a vector, in implicit solves
+  std::int64_t factorisations = 0;
 };
 
 /// Runs one method. Owns scratch memory and nothing else: no allocation in a step once the
@@ -92,7 +97,7 @@ class Integrator {
   void count(std::int64_t evaluations) { work_.evaluations += evaluations; }
 
   /// Must be called when anything but this integrator changed x, v, or what forces depend on.
-  void restart() { acceleration_known_ = false, increment_step_ = 0; }
+  void restart() { acceleration_known_ = false, increment_step_ = 0, solver_.restart(); }
   /// As restart, and what error control has learnt is gone: for other points.
   void forget() { restart(), adapted_step_ = 0, adapted_error_ = 1; }
 
@@ -112,7 +117,6 @@ class Integrator {
   SolveResult run(const Nystrom&, Dynamics<S>&, Points<S>& x, Points<S>& v, double t, double h);
   SolveResult run(const Implicit&, Dynamics<S>&, Points<S>& x, Points<S>& v, double t, double h);
   void evaluate(Dynamics<S>&, const Points<S>& x, const Points<S>& v, double t, Points<S>& a);
-  void multiply(Dynamics<S>&, const Points<S>& x, const Points<S>& v, S h, bool safe);
   void run_stages(const RungeKutta&, Dynamics<S>&, const Points<S>& x, const Points<S>& v, double t, double h);
   double error_of_stages(const RungeKutta&, const Values<S>& inverse_mass, double h);
   void finish(Dynamics<S>&, double t0, double t1, Points<S>& x, Points<S>& v);
@@ -120,10 +124,6 @@ class Integrator {
   void collide(Dynamics<S>&, double t0, double t1, Points<S>& x, Points<S>& v);
   void prescribe(Dynamics<S>&, double t0, const Points<S>& from, double t1, Points<S>& x, Points<S>& v);
   void settle(Dynamics<S>&, Points<S>& v);
-  bool solve_linear(Dynamics<S>&, S h, bool safe, double tolerance, const Points<S>& x, const Points<S>& v,
-                    const Points<S>& right, Points<S>& solution);
-
-  double rounding_of_force(Dynamics<S>&, S h);
 
   const Method* method_;
   bool compensated_;
@@ -137,7 +137,8 @@ class Integrator {
   Points<S> touched_x_, touched_v_;                    // before a collision
   Points<S> acceleration_, increment_, from_, drift_from_, predicted_;
   std::vector<Points<S>> stage_velocity_, stage_acceleration_;
-  Points<S> stage_x_, stage_v_, residual_, preconditioned_, right_, direction_, product_, trial_x_, trial_v_, update_;
+  Points<S> stage_x_, stage_v_;
+  ImplicitSolver<S> solver_;
 };
 
 extern template class Integrator<float>;

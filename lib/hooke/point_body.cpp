@@ -330,6 +330,11 @@ void PointBody<S>::add_implicit_times(const Points<S>& x, const Points<S>& v, S 
 }
 
 template <class S>
+void PointBody<S>::add_couplings(const Points<S>& x, const Points<S>& v, double h, std::vector<Coupling>& out) {
+  for (const auto& field : fields_) field->add_couplings(x, v, h, out);
+}
+
+template <class S>
 typename ForceField<S>::Rates PointBody<S>::rate_bounds() const {
   typename ForceField<S>::Rates rates;
   for (const auto& field : fields_) {

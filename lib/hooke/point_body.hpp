@@ -115,6 +115,7 @@ class PointBody : public Body, protected Dynamics<S> {
   const Values<S>& inverse_mass() const override { return points_.inverse_mass; }
   void add_implicit_times(const Points<S>& x, const Points<S>& v, S h, bool safe, const Points<S>& d,
                           Points<S>& out) override;
+  void add_couplings(const Points<S>& x, const Points<S>& v, double h, std::vector<Coupling>& out) override;
 
   /// One substep; linear rigid bodies add their impacts to it.
   virtual SolveResult substep(double t, double h);

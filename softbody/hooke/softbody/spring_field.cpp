@@ -183,6 +183,17 @@ void SpringField<S>::add_damping_times(const Points<S>& x, const Points<S>&, con
 }
 
 template <class S>
+void SpringField<S>::add_couplings(const Points<S>& x, const Points<S>&, double h, std::vector<Coupling>& out) const {
+  for (Index i = 0; i < size(); ++i) {
+    const int a = a_[std::size_t(i)], b = b_[std::size_t(i)];
+    const Unit<S> unit = direction(x, a, b);
+    const Vec3 n = unit.n.template cast<double>();
+    const double k = h * h * double(stiffness_[i]), side = k * std::max(double(across(unit, rest_[i])), 0.0);
+    out.push_back({a, b, side * Mat3::Identity() + (k - side + h * double(damping_[i])) * n * n.transpose()});
+  }
+}
+
+template <class S>
 double SpringField<S>::potential_energy(const Points<S>& x) const {
   double sum = 0;
   for (Index i = 0; i < size(); ++i) {

@@ -28,6 +28,7 @@ class SpringField final : public ForceField<S> {
                       Points<S>& f) const override;
   void add_stiffness_times(const Points<S>& x, const Points<S>& d, bool safe, Points<S>& out) const override;
   void add_damping_times(const Points<S>& x, const Points<S>& v, const Points<S>& d, Points<S>& out) const override;
+  void add_couplings(const Points<S>& x, const Points<S>& v, double h, std::vector<Coupling>& out) const override;
   double potential_energy(const Points<S>& x) const override;
 
   /// ω² ≤ max over points i of the largest eigenvalue of Σ_j k_ij (w_i + w_j) P_ij, where P_ij is
