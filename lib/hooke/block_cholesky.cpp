@@ -151,8 +151,7 @@ void BlockCholesky::solve(Points<double>& x) {
     b[0] /= l(0, 0);
     b[1] = (b[1] - l(1, 0) * b[0]) / l(1, 1);
     b[2] = (b[2] - l(2, 0) * b[0] - l(2, 1) * b[1]) / l(2, 2);
-    for (std::size_t p = first_[j] + 1; p < first_[j + 1]; ++p)
-      work_[std::size_t(row_[p])].noalias() -= value_[p] * b;
+    for (std::size_t p = first_[j] + 1; p < first_[j + 1]; ++p) work_[std::size_t(row_[p])].noalias() -= value_[p] * b;
   }
   for (std::size_t j = work_.size(); j-- > 0;) {
     Vec3 b = work_[j];

@@ -37,15 +37,15 @@ class BlockCholesky {
   Index size_ = -1;
   double cost_ = 0;
   std::vector<std::pair<int, int>> pairs_;
-  std::vector<int> place_;                // of a point in the order of elimination
-  std::vector<std::size_t> first_;        // of the blocks of a column: its diagonal block
-  std::vector<int> row_;                  // of a block
-  std::vector<std::size_t> slot_;         // of a pair's block
-  std::vector<char> turned_;              // ... true where it is stored as its transpose
-  std::vector<Mat3> value_;               // the factor
-  std::vector<std::size_t> where_;        // of a row in the present column
-  std::vector<int> waiting_, next_;       // columns that change column j next, as lists
-  std::vector<std::size_t> reached_;      // their next block
+  std::vector<int> place_;            // of a point in the order of elimination
+  std::vector<std::size_t> first_;    // of the blocks of a column: its diagonal block
+  std::vector<int> row_;              // of a block
+  std::vector<std::size_t> slot_;     // of a pair's block
+  std::vector<char> turned_;          // ... true where it is stored as its transpose
+  std::vector<Mat3> value_;           // the factor
+  std::vector<std::size_t> where_;    // of a row in the present column
+  std::vector<int> waiting_, next_;   // columns that change column j next, as lists
+  std::vector<std::size_t> reached_;  // their next block
   std::vector<Vec3> work_;
 };
 

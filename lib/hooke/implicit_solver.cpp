@@ -6,7 +6,6 @@
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <limits>
 
 namespace hooke {
@@ -16,6 +15,9 @@ namespace {
 // Speeds below this count as none [m/s]: their squares leave the range of double.
 template <class S>
 constexpr double kStandstill = std::is_same_v<S, float> ? 1e-20 : 1e-100;
+
+// Planes nearer than this may be touched in a step, and points nearer than this lie on theirs [m].
+constexpr double kReach = 5e-3, kLies = 1e-4;
 
 // Most halvings of a step, and the share of the promised fall of Φ that is enough.
 constexpr int kHalvings = 40;
@@ -74,99 +76,141 @@ double ImplicitSolver<S>::miss(const Step& step, Points<S>& u, Points<S>& end, P
 // What sliding friction takes.
 template <class S>
 void ImplicitSolver<S>::rub(const Step& step, const Points<S>& u, Points<S>& out) const {
-  for (std::size_t c = 0; c < planes.size(); ++c) {
-    const Contact& contact = contacts_[c];
+  for (const Contact& contact : contacts_) {
     if (contact.touch != Touch::Slides) continue;
-    const StepPlane<S>& plane = planes[c];
-    const Index i = plane.point;
-    Vec slip = row(u, i) - plane.surface_velocity;
-    slip -= slip.dot(plane.normal) * plane.normal;
+    const Index i = contact.point;
+    const Vec slip = contact.slip(row(u, i));
     const S speed = slip.norm();
     const Vec against = speed > contact.still ? Vec(slip / speed) : contact.against;
-    set_row<S>(out, i, row(out, i) - plane.friction * contact.pressure * step.dynamics.inverse_mass()[i] * against);
+    set_row<S>(out, i, row(out, i) - contact.friction * contact.pressure * step.dynamics.inverse_mass()[i] * against);
   }
+}
+
+// The planes of the coming step: what is near. Where a solid throws back, only what lies on it: the rest must hit
+// first.
+template <class S>
+void ImplicitSolver<S>::find_planes(const Step& step, double whole) {
+  planes_.clear(), contacts_.clear(), held_.clear(), rubs_.clear();
+  rounds_ = 1;
+  if (!step.dynamics.collides()) return;
+  step.dynamics.planes(step.t, step.from, step.t + whole, S(kReach), planes_);
+  const S h = S(whole);
+  for (const ContactPlane<S>& plane : planes_) {
+    if (plane.restitution > 0 && plane.gap > S(kLies)) continue;
+    Contact contact;
+    contact.point = plane.point;
+    contact.normal = plane.normal;
+    contact.surface_velocity = plane.carried / h;
+    contact.friction = plane.friction;
+    contact.least = (plane.normal.dot(plane.carried) - plane.gap) / h;
+    contacts_.push_back(contact);
+  }
+  std::sort(contacts_.begin(), contacts_.end(), [](const Contact& a, const Contact& b) { return a.point < b.point; });
+  for (std::size_t c = 1; c < contacts_.size(); ++c)
+    if (contacts_[c].point == contacts_[c - 1].point) rounds_ = 4;
 }
 
 // Which planes hold their points, and how, from what u_ misses.
 template <class S>
 void ImplicitSolver<S>::find_touches(const Step& step, double tolerance) {
-  held_.clear();
+  held_.clear(), rubs_.clear();
   constexpr S kRounding = 16 * std::numeric_limits<S>::epsilon();
-  for (std::size_t c = 0; c < planes.size(); ++c) {
-    const StepPlane<S>& plane = planes[c];
-    Contact& contact = contacts_[c];
-    const Index i = plane.point;
+  for (Contact& contact : contacts_) {
+    const Index i = contact.point;
     const S mass = step.dynamics.mass()[i];
     const Vec u = row(u_, i), missed = row(out_, i);
-    const S along = u.dot(plane.normal), press = -missed.dot(plane.normal);
-    const S still = kRounding * std::max({u.template lpNorm<Eigen::Infinity>(), std::abs(contact.least),
-                                          plane.surface_velocity.template lpNorm<Eigen::Infinity>()}) +
+    const S along = u.dot(contact.normal), press = -missed.dot(contact.normal);
+    contact.still = kRounding * std::max({u.template lpNorm<Eigen::Infinity>(), std::abs(contact.least),
+                                          contact.surface_velocity.template lpNorm<Eigen::Infinity>()}) +
                     S(kStandstill<S>);
-    contact.still = still;
-    const bool touches = along <= contact.least + still;
+    const bool touches = along <= contact.least + contact.still;
     const bool held = touches && (contact.touch == Touch::Free ? press > 0 : press > -S(tolerance));
     contact.pressure = mass * std::max(press, S(0));
     if (!held || step.dynamics.inverse_mass()[i] == 0) {
       contact.touch = Touch::Free;
       continue;
     }
-    Held hold{i, plane.normal, Vec::Zero(), 1};
-    Vec slip = u - plane.surface_velocity, pull = missed + press * plane.normal;
-    slip -= slip.dot(plane.normal) * plane.normal;
+    Held hold{i, contact.normal, Vec::Zero(), 1};
+    const Vec slip = contact.slip(u), pull = missed + press * contact.normal;
     const S speed = slip.norm(), strength = pull.norm();
-    if (speed > still && contact.touch != Touch::Sticks) {
+    if (speed > contact.still && contact.touch != Touch::Sticks) {
       contact.touch = Touch::Slides;
       contact.against = slip / speed;
-    } else if (mass * strength <= plane.friction * contact.pressure) {
+      rubs_.push_back({i, contact.friction * contact.pressure / speed, contact.normal, contact.against});
+    } else if (mass * strength <= contact.friction * contact.pressure) {
       contact.touch = Touch::Sticks;
       hold.directions = 3;
     } else {
       contact.touch = Touch::Slides;
-      contact.against = pull / strength;
-      hold.second = plane.normal.cross(contact.against);
-      hold.directions = 2;
+      contact.against = strength > 0 ? Vec(pull / strength) : Vec(0, 0, 0);
+      if (contact.friction > 0 && strength > 0) {
+        hold.second = contact.normal.cross(contact.against);
+        hold.directions = 2;
+      }
     }
-    held_.push_back(hold);
+    if (!held_.empty() && held_.back().point == i)
+      hold_more(held_.back(), hold);
+    else
+      held_.push_back(hold);
+  }
+}
+
+// A point that another plane holds already.
+template <class S>
+void ImplicitSolver<S>::hold_more(Held& held, const Held& more) {
+  if (more.directions == 3) held.directions = 3;
+  for (int d = 0; d < more.directions && held.directions < 3; ++d) {
+    Vec n = d == 0 ? more.first : more.second;
+    n -= n.dot(held.first) * held.first;
+    if (held.directions == 2) n -= n.dot(held.second) * held.second;
+    const S length = n.norm();
+    if (length < S(1e-3)) continue;
+    if (held.directions == 1) held.second = n / length;
+    ++held.directions;
   }
 }
 
 template <class S>
 void ImplicitSolver<S>::filter(Points<S>& p) const {
-  for (int round = 0; round < rounds_; ++round)
-    for (const Held& held : held_) {
-      if (held.directions == 3) {
-        set_row<S>(p, held.point, Vec::Zero());
-        continue;
-      }
-      Vec value = row(p, held.point);
-      value -= value.dot(held.first) * held.first;
-      if (held.directions == 2) value -= value.dot(held.second) * held.second;
-      set_row(p, held.point, value);
+  for (const Held& held : held_) {
+    if (held.directions == 3) {
+      set_row<S>(p, held.point, Vec::Zero());
+      continue;
     }
+    Vec value = row(p, held.point);
+    value -= value.dot(held.first) * held.first;
+    if (held.directions == 2) value -= value.dot(held.second) * held.second;
+    set_row(p, held.point, value);
+  }
 }
 
 // Puts velocities on the right side of their planes; sliding ends where it would turn round.
 template <class S>
 void ImplicitSolver<S>::clip(Points<S>& u) const {
   for (int round = 0; round < rounds_; ++round)
-    for (std::size_t c = 0; c < planes.size(); ++c) {
-      const StepPlane<S>& plane = planes[c];
-      const Contact& contact = contacts_[c];
-      Vec value = row(u, plane.point);
-      const S along = value.dot(plane.normal);
+    for (const Contact& contact : contacts_) {
+      Vec value = row(u, contact.point);
+      const S along = value.dot(contact.normal);
       const S normal = contact.touch == Touch::Sticks ? contact.least : std::max(along, contact.least);
-      Vec slip = value - plane.surface_velocity;
-      slip -= slip.dot(plane.normal) * plane.normal;
-      const bool stops = contact.touch == Touch::Sticks ||
-                         (contact.touch == Touch::Slides && normal <= contact.least && slip.dot(contact.against) <= 0);
-      if (stops) {
-        const Vec tangent =
-            plane.surface_velocity - plane.surface_velocity.dot(plane.normal) * plane.normal;
-        set_row<S>(u, plane.point, tangent + normal * plane.normal);
-      } else if (normal != along) {
-        set_row<S>(u, plane.point, value + (normal - along) * plane.normal);
-      }
+      const Vec slip = contact.slip(value);
+      const bool stops = contact.touch == Touch::Sticks || (contact.touch == Touch::Slides && contact.friction > 0 &&
+                                                            normal <= contact.least && slip.dot(contact.against) <= 0);
+      if (stops)
+        set_row<S>(u, contact.point, value - slip + (normal - along) * contact.normal);
+      else if (normal != along)
+        set_row<S>(u, contact.point, value + (normal - along) * contact.normal);
     }
+}
+
+template <class S>
+void ImplicitSolver<S>::settle(Points<S>& v) const {
+  for (const Contact& contact : contacts_) {
+    if (contact.touch == Touch::Free) continue;
+    Vec relative = row(v, contact.point) - contact.surface_velocity;
+    relative -= relative.dot(contact.normal) * contact.normal;
+    if (contact.touch == Touch::Sticks) relative.setZero();
+    set_row<S>(v, contact.point, contact.surface_velocity + relative);
+  }
 }
 
 // product_ = (M + h²K + hD) direction_, on what is free.
@@ -178,7 +222,8 @@ void ImplicitSolver<S>::multiply(const Step& step, bool safe) {
   for (int k = 0; k < 3; ++k) product_.col(k) = mass * direction_.col(k);
   ++step.work.products;
   step.dynamics.add_implicit_times(x_, u_, S(step.h), safe, direction_, product_);
-  for (const Rub& rub : rubs_) set_row<S>(product_, rub.point, row(product_, rub.point) + rub.times(row(direction_, rub.point)));
+  for (const Rub& rub : rubs_)
+    set_row<S>(product_, rub.point, row(product_, rub.point) + rub.times(row(direction_, rub.point)));
   for (int k = 0; k < 3; ++k) product_.col(k) = (inverse_mass == S(0)).select(S(0), product_.col(k));
   filter(product_);
 }
@@ -220,8 +265,7 @@ void ImplicitSolver<S>::factor(const Step& step) {
   off_diagonal_.resize(couplings_.size());
   for (std::size_t k = 0; k < couplings_.size(); ++k) {
     const Coupling& c = couplings_[k];
-    if (c.b >= 0)
-      off_diagonal_[k] = -projector_[std::size_t(c.a)] * c.block * projector_[std::size_t(c.b)];
+    if (c.b >= 0) off_diagonal_[k] = -projector_[std::size_t(c.a)] * c.block * projector_[std::size_t(c.b)];
   }
   for (std::size_t i = 0; i < projector_.size(); ++i) {
     const Mat3 &p = projector_[i], rest = Mat3::Identity() - p, whole = diagonal_[i];
@@ -337,17 +381,12 @@ double ImplicitSolver<S>::fall(const Step& step, const Points<S>& out) const {
 
 template <class S>
 SolveResult ImplicitSolver<S>::solve(const Implicit& scheme, Dynamics<S>& dynamics, const Points<S>& x,
-                                     const Points<S>& v, double t, double h, Work& work) {
+                                     const Points<S>& v, double t, double whole, Work& work) {
+  // With u = vθ and the end at t + θh both unknowns are those of a backward Euler step of θh.
+  const double h = scheme.theta * whole;
   const Step step{dynamics, x, v, t, h, work};
   const double tolerance = tolerance_of<S>(scheme);
-  contacts_.assign(planes.size(), {});
-  held_.clear(), rubs_.clear();
-  rounds_ = 1;
-  for (std::size_t c = 0; c < planes.size(); ++c) {
-    const StepPlane<S>& plane = planes[c];
-    contacts_[c].least = (plane.offset - plane.normal.dot(row(x, plane.point))) / S(h);
-    if (c > 0 && planes[c - 1].point == plane.point) rounds_ = 4;
-  }
+  find_planes(step, whole);
   u_ = v;
   clip(u_);
   SolveResult result;
@@ -359,10 +398,9 @@ SolveResult ImplicitSolver<S>::solve(const Implicit& scheme, Dynamics<S>& dynami
   bool prepared = false;
   radius_ = std::numeric_limits<double>::infinity();
   spent_ = 0;
-  double rounding = -1, before = 0;
+  double rounding = -1, gone = 0;  // gone: by how much Φ fell
   for (int iteration = 0;; ++iteration) {
-    const double scale =
-        std::max({largest(u_), largest(v), h * largest(acceleration_), kStandstill<S>});
+    const double scale = std::max({largest(u_), largest(v), h * largest(acceleration_), kStandstill<S>});
     find_touches(step, tolerance * scale);
     filtered_ = out_;
     rub(step, u_, filtered_);
@@ -370,17 +408,12 @@ SolveResult ImplicitSolver<S>::solve(const Implicit& scheme, Dynamics<S>& dynami
     const double residual = largest(filtered_);
     result.residual = residual / scale;
     result.converged = scheme.linearised ? residual == 0 : result.residual <= tolerance;
-    if (result.converged || iteration == scheme.max_iterations) break;
-    rubs_.clear();
-    for (std::size_t c = 0; c < planes.size(); ++c) {
-      if (contacts_[c].touch != Touch::Slides) continue;
-      const StepPlane<S>& plane = planes[c];
-      Vec slip = row(u_, plane.point) - plane.surface_velocity;
-      slip -= slip.dot(plane.normal) * plane.normal;
-      const S speed = slip.norm();
-      if (speed > contacts_[c].still)
-        rubs_.push_back({plane.point, plane.friction * contacts_[c].pressure / speed, plane.normal, slip / speed});
+    if (!result.converged && iteration == scheme.max_iterations && gone > 0) {
+      // Not the minimum, but downhill from where it began: bounded, and the next step goes on from there.
+      result.converged = true;
+      ++work.unfinished;
     }
+    if (result.converged || iteration == scheme.max_iterations) break;
     if (!prepared) {
       prepare(step);
       prepared = true;
@@ -451,7 +484,10 @@ SolveResult ImplicitSolver<S>::solve(const Implicit& scheme, Dynamics<S>& dynami
         radius_ *= end > 0.25 * start ? 4 : 2;
       else if (!on_border_)
         radius_ = std::isfinite(radius_) ? std::max(radius_, 2 * length_) : 4 * length_;
-      if (found) break;
+      if (found) {
+        gone += fallen;
+        break;
+      }
     }
     if (!found || (iteration > 1 && !(best < 0.5 * residual))) {
       // Large forces that balance leave a rest that is nothing but the rounding of positions.
@@ -464,11 +500,8 @@ SolveResult ImplicitSolver<S>::solve(const Implicit& scheme, Dynamics<S>& dynami
       }
       if (!found) break;
     }
-    before = residual;
     std::swap(u_, trial_u_), std::swap(x_, trial_x_), std::swap(out_, trial_out_);
-    static const bool trace_ = getenv("TR"); if (trace_) std::fprintf(stderr, "  it %d res %.3g -> %.3g scale %.3g radius %.3g border %d products %ld held %zu fact %ld step %.3g\n", iteration, residual, best, scale, radius_, on_border_, long(work.products), held_.size(), long(work.factorisations), largest(step_));
   }
-  (void)before;
   return result;
 }
 

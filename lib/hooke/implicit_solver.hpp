@@ -2,6 +2,7 @@
 #pragma once
 
 #include <hooke/block_cholesky.hpp>
+#include <hooke/contacts.hpp>
 #include <hooke/method.hpp>
 #include <hooke/types.hpp>
 
@@ -14,16 +15,6 @@ template <class S>
 class Dynamics;
 struct SolveResult;
 struct Work;
-
-/// A plane that a point may not cross in a step: normal · x' ≥ offset at its end.
-template <class S>
-struct StepPlane {
-  Index point;
-  Eigen::Matrix<S, 3, 1> normal;            ///< unit, out of the solid
-  S offset;                                 ///< [m]
-  Eigen::Matrix<S, 3, 1> surface_velocity;  ///< of the solid there [m/s]
-  S friction;                               ///< Coulomb's coefficient
-};
 
 /// Finds u = v + h a(x + h u, u, t + h), the velocity of a backward Euler step.
 ///
@@ -41,14 +32,15 @@ struct StepPlane {
 template <class S>
 class ImplicitSolver {
  public:
-  /// Solves from u = v; the planes are those in `planes`. The end is in position() and velocity().
+  /// Solves from u = v for a step of θh; points do not cross planes in the whole of h. The end of θh is in position()
+  /// and velocity().
   SolveResult solve(const Implicit& scheme, Dynamics<S>& dynamics, const Points<S>& x, const Points<S>& v, double t,
                     double h, Work& work);
   const Points<S>& position() const { return x_; }
   const Points<S>& velocity() const { return u_; }
 
-  /// Of the coming solve.
-  std::vector<StepPlane<S>> planes;
+  /// Makes v of the points that the last solve held go with what holds them.
+  void settle(Points<S>& v) const;
 
   /// Forgets what it knows of the last step's matrix.
   void restart() { factored_ = false; }
@@ -57,11 +49,18 @@ class ImplicitSolver {
   using Vec = Eigen::Matrix<S, 3, 1>;
   enum class Touch : char { Free, Slides, Sticks };
   struct Contact {
+    Index point = 0;
+    Vec normal{0, 0, 0}, surface_velocity{0, 0, 0};
+    S friction = 0;
     Touch touch = Touch::Free;
     S least = 0;           // of normal · u
     S still = 0;           // speeds below are rounding
     S pressure = 0;        // [kg m/s] of the last iteration
     Vec against{0, 0, 0};  // the direction of sliding
+    Vec slip(const Vec& u) const {
+      const Vec relative = u - surface_velocity;
+      return relative - relative.dot(normal) * normal;
+    }
   };
   struct Held {  // what a point may not do: move along one or two orthogonal directions, or at all (3)
     Index point;
@@ -72,9 +71,7 @@ class ImplicitSolver {
     Index point;
     S strength;
     Vec normal, direction;
-    Vec times(const Vec& d) const {
-      return strength * (d - normal * normal.dot(d) - direction * direction.dot(d));
-    }
+    Vec times(const Vec& d) const { return strength * (d - normal * normal.dot(d) - direction * direction.dot(d)); }
     Mat3 matrix() const {
       const Vec3 n = normal.template cast<double>(), d = direction.template cast<double>();
       return double(strength) * (Mat3::Identity() - n * n.transpose() - d * d.transpose());
@@ -91,7 +88,9 @@ class ImplicitSolver {
   double miss(const Step& step, Points<S>& u, Points<S>& end, Points<S>& out);
   void find_touches(const Step& step, double tolerance);
   void rub(const Step& step, const Points<S>& u, Points<S>& out) const;
+  static void hold_more(Held& held, const Held& more);
   void filter(Points<S>& p) const;
+  void find_planes(const Step& step, double whole);
   void clip(Points<S>& u) const;
   void multiply(const Step& step, bool safe);
   void prepare(const Step& step);
@@ -102,14 +101,15 @@ class ImplicitSolver {
   double fall(const Step& step, const Points<S>& out) const;
 
   bool factored_ = false;
-  double patience_ = 0;  // products that are worth a factorisation
-  double spent_ = 0;     // products since the last one
+  double patience_ = 0;             // products that are worth a factorisation
+  double spent_ = 0;                // products since the last one
   double radius_ = 0, length_ = 0;  // of the trust region and of the last update, in the preconditioner's norm
   bool on_border_ = false;
-  int rounds_ = 1;       // more where a point has more than one plane
+  int rounds_ = 1;  // more where a point has more than one plane
   BlockCholesky cholesky_;
   std::vector<Coupling> couplings_;
   std::vector<Mat3> diagonal_, off_diagonal_, inverse_;
+  std::vector<ContactPlane<S>> planes_;
   std::vector<Contact> contacts_;
   std::vector<Held> held_;
   std::vector<Rub> rubs_;

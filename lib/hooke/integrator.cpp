@@ -333,21 +333,23 @@ void Dynamics<S>::add_couplings(const Points<S>&, const Points<S>&, double, std:
 template <class S>
 SolveResult Integrator<S>::run(const Implicit& scheme, Dynamics<S>& dynamics, Points<S>& x, Points<S>& v, double t,
                                double h) {
-  // With u = vθ and the end at t + θh both unknowns are those of a backward Euler step of θh.
-  const double solved = scheme.theta * h;
   from_ = x;
-  const SolveResult result = solver_.solve(scheme, dynamics, x, v, t, solved, work_);
+  const SolveResult result = solver_.solve(scheme, dynamics, x, v, t, h, work_);
   if (scheme.theta == 1 && !scheme.linearised) {
     x = solver_.position();
     v = solver_.velocity();
   } else {
     x = from_ + S(h) * solver_.velocity();
     v += (solver_.velocity() - v) / S(scheme.theta);
+    solver_.settle(v);
     if (dynamics.prescribes()) dynamics.prescribe(t, from_, t + h, x, v);
   }
   if (dynamics.collides()) dynamics.collide(t, from_, t + h, x, v);
   return result;
 }
+
+template <class S>
+void Dynamics<S>::planes(double, const Points<S>&, double, S, std::vector<ContactPlane<S>>&) {}
 
 template class Dynamics<float>;
 template class Dynamics<double>;

@@ -42,6 +42,8 @@ class Dynamics {
   virtual bool collides() const = 0;
 
   // For implicit methods only.
+  /// Appends the planes that points at x at t0 must not cross until t1, as far as they are within `reach` [m].
+  virtual void planes(double t0, const Points<S>& x, double t1, S reach, std::vector<ContactPlane<S>>& out);
   virtual const Values<S>& mass() const = 0;          ///< [kg], > 0
   virtual const Values<S>& inverse_mass() const = 0;  ///< [1/kg], 0 = held
   /// out += h² K d + h D d at (x, v).
@@ -61,9 +63,10 @@ struct SolveResult {
 /// What integration has cost so far. A force evaluation and a product with K and D are about as dear
 /// as each other; explicit methods need no products.
 struct Work {
-  std::int64_t evaluations = 0;  ///< of the accelerations of all points
-  std::int64_t products = 0;     ///< of h²K + hD with a vector, in implicit solves
-  std::int64_t factorisations = 0;
+  std::int64_t evaluations = 0;     ///< of the accelerations of all points
+  std::int64_t products = 0;        ///< of h²K + hD with a vector, in implicit solves
+  std::int64_t factorisations = 0;  ///< of sparse matrices, in implicit solves
+  std::int64_t unfinished = 0;      ///< implicit steps that stopped at their limit of iterations
 };
 
 /// Runs one method. Owns scratch memory and nothing else: no allocation in a step once the

@@ -111,6 +111,9 @@ class PointBody : public Body, protected Dynamics<S> {
   void collide(double t0, const Points<S>& from, double t1, Points<S>& x, Points<S>& v) override;
   void settle(Points<S>& v) override { contacts_.settle(v); }
   bool collides() const override { return contacts_.any(); }
+  void planes(double t0, const Points<S>& x, double t1, S reach, std::vector<ContactPlane<S>>& out) override {
+    contacts_.planes(t0, x, t1, reach, points_.inverse_mass, out);
+  }
   const Values<S>& mass() const override { return points_.mass; }
   const Values<S>& inverse_mass() const override { return points_.inverse_mass; }
   void add_implicit_times(const Points<S>& x, const Points<S>& v, S h, bool safe, const Points<S>& d,

@@ -179,8 +179,8 @@ void buckle(double stiffness) {
 
 TYPED_TEST(BlowUp, NeverComesToImplicitEulerOnABucklingColumn) { buckle<TypeParam>(200); }
 
-// Ten times as stiff a step has several solutions, and Newton's method circles between them.
-TYPED_TEST(BlowUp, DISABLED_NeverComesToImplicitEulerOnAStifflyBucklingColumn) { buckle<TypeParam>(2000); }
+// Ten times as stiff a step has several solutions, and Newton's method alone circles between them.
+TYPED_TEST(BlowUp, NeverComesToImplicitEulerOnAStifflyBucklingColumn) { buckle<TypeParam>(2000); }
 
 }  // namespace
 }  // namespace hooke::test
