@@ -498,7 +498,12 @@ SolveResult ImplicitSolver<S>::solve(const Implicit& scheme, Dynamics<S>& dynami
         result.converged = true;
         break;
       }
-      if (!found) break;
+      if (!found) {
+        // Friction that depends on the pressure of the last iteration need not come to rest.
+        result.converged = gone > 0 || !held_.empty();
+        work.unfinished += result.converged;
+        break;
+      }
     }
     std::swap(u_, trial_u_), std::swap(x_, trial_x_), std::swap(out_, trial_out_);
   }

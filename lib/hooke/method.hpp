@@ -41,8 +41,10 @@ struct Nystrom {
 
 /// The one-leg theta method: v' = v + h a(xθ, vθ, t + θh), x' = x + h vθ, where xθ = (1-θ) x + θ x'
 /// and vθ likewise; θ = 1 is backward Euler, θ = ½ the implicit midpoint rule. Solved by Newton's
-/// method with matrix-free conjugate gradients until the residual is below `tolerance` of the
-/// velocity scale (0: 1e-12 in double, 1e-6 in float, which is also the least).
+/// method in a trust region (implicit_solver.hpp), contacts and friction included, until the residual is below
+/// `tolerance` of the velocity scale (0: 1e-12 in double, 1e-6 in float, which is also the least), or below what
+/// the rounding of positions makes of the forces. A step that needs more than max_iterations ends where it is, downhill
+/// from its start, and is counted in Work::unfinished.
 struct Implicit {
   double tolerance = 0;
   int max_iterations = 200;
