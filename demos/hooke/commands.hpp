@@ -42,6 +42,14 @@ struct ReportOptions {
 };
 int report(const ReportOptions& options);
 
+struct StabilityOptions {
+  std::vector<std::string> cases;  ///< names of hard cases; empty: all
+  std::filesystem::path out;       ///< folder for table.csv, table.html, table.md and table.png
+  bool thorough = false;           ///< minutes of simulated time
+  int threads = 1;                 ///< that share the rows
+};
+int stability(const StabilityOptions& options);
+
 int list();
 
 }  // namespace hooke::command

@@ -26,6 +26,7 @@ struct Arguments {
   SimulateOptions simulate;
   RenderOptions render;
   ReportOptions report;
+  StabilityOptions stability;
   std::string validate_scene, size;
   bool list = false, no_estimate = false;
 };
@@ -111,6 +112,16 @@ int dispatch(int argc, char** argv) {
       "Processor time a scene [s], three times that for large ones; its reference may take as much");
   report_command->footer("Example: hooke report hanging-sheet-32 --budget 20 --out report");
 
+  CLI::App* stability_command =
+      app.add_subcommand("stability", "Hard cases: what stays bounded, comes to rest and keeps its energy");
+  stability_command->add_option("case", a.stability.cases, "Names of hard cases; all if none is given");
+  stability_command->add_option("--out", a.stability.out, "Folder for the table: CSV, HTML, Markdown and a picture")
+      ->required();
+  stability_command->add_flag("--long", a.stability.thorough,
+                              "Minutes of simulated time and full sizes: an hour instead of a minute or two");
+  stability_command->add_option("--threads", a.stability.threads, "Threads that share the rows");
+  stability_command->footer("Example: hooke stability mass-ratio-chain rest --out stability");
+
   CLI::App* list_command = app.add_subcommand("list", "The scenes that have a name");
   list_command->footer("Example: hooke list");
   app.require_subcommand(0, 1);
@@ -145,9 +156,10 @@ int dispatch(int argc, char** argv) {
     return render(a.render);
   }
   if (report_command->parsed()) return report(a.report);
+  if (stability_command->parsed()) return stability(a.stability);
   if (validate_command->parsed()) return validate(a.validate_scene);
   if (list_command->parsed() || a.list) return list();
-  return tell(kBadInput, "a command is needed: simulate, render, validate, report or list (hooke --help)");
+  return tell(kBadInput, "a command is needed: simulate, render, validate, report, stability or list (hooke --help)");
 }
 
 }  // namespace

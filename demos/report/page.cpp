@@ -26,20 +26,6 @@ using nlohmann::json;
 
 std::string_view part(const char* begin, const char* end) { return {begin, std::size_t(end - begin)}; }
 
-std::string escaped(const std::string& text) {
-  std::string out;
-  for (const char c : text)
-    out += c == '<' ? "&lt;" : c == '>' ? "&gt;" : c == '&' ? "&amp;" : c == '"' ? "&quot;" : std::string(1, c);
-  return out;
-}
-
-std::string number(double value, const char* pattern = "%.3g") {
-  if (!std::isfinite(value)) return "–";
-  char text[60];
-  std::snprintf(text, sizeof text, pattern, value);
-  return text;
-}
-
 json number_of(double value) { return std::isfinite(value) ? json(value) : json(nullptr); }
 
 json json_of(const Row& row) {
@@ -152,11 +138,6 @@ std::string set_up(const SceneReport& report) {
   return out;
 }
 
-std::string facts_of(const Machine& machine) {
-  return escaped(machine.cpu) + "; " + escaped(machine.compiler) + "; Hooke " + escaped(machine.version) + ", commit " +
-         escaped(machine.commit) + (machine.bullet.empty() ? "" : "; Bullet " + escaped(machine.bullet));
-}
-
 std::string section(const SceneReport& report, const Machine& machine) {
   const auto& scene = report.scene;
   std::string out = "<section id=\"" + scene.name + "\">\n<h2>" + escaped(scene.title) + "</h2>\n";
@@ -184,16 +165,41 @@ std::string section(const SceneReport& report, const Machine& machine) {
 
 }  // namespace
 
+std::string escaped(const std::string& text) {
+  std::string out;
+  for (const char c : text)
+    out += c == '<' ? "&lt;" : c == '>' ? "&gt;" : c == '&' ? "&amp;" : c == '"' ? "&quot;" : std::string(1, c);
+  return out;
+}
+
+std::string number(double value, const char* pattern) {
+  if (!std::isfinite(value)) return "–";
+  char text[60];
+  std::snprintf(text, sizeof text, pattern, value);
+  return text;
+}
+
+std::string facts_of(const Machine& machine) {
+  return escaped(machine.cpu) + "; " + escaped(machine.compiler) + "; Hooke " + escaped(machine.version) + ", commit " +
+         escaped(machine.commit) + (machine.bullet.empty() ? "" : "; Bullet " + escaped(machine.bullet));
+}
+
+std::string page_head(const std::string& title) {
+  std::string out =
+      "<!DOCTYPE html>\n<html lang=en>\n<head>\n<meta charset=utf-8>\n<meta name=viewport "
+      "content=\"width=device-width, initial-scale=1\">\n<title>" +
+      escaped(title) + "</title>\n<style>\n";
+  out += part(hooke_page_css, hooke_page_css_end);
+  return out + "</style>\n</head>\n<body>\n";
+}
+
 std::string page(const std::vector<SceneReport>& reports, const Machine& machine) {
   std::string data = data_of(reports).dump();
   // Nothing in the data may end the script element.
   for (std::size_t at = 0; (at = data.find("</", at)) != std::string::npos; at += 3) data.replace(at, 2, "<\\/");
-  std::string out =
-      "<!DOCTYPE html>\n<html lang=en>\n<head>\n<meta charset=utf-8>\n<meta name=viewport "
-      "content=\"width=device-width, initial-scale=1\">\n<title>Hooke: speed against error</title>\n<style>\n";
-  out += part(hooke_page_css, hooke_page_css_end);
+  std::string out = page_head("Hooke: speed against error");
   out +=
-      "</style>\n</head>\n<body>\n<header>\n<h1>Speed against error</h1>\n<p class=soft>" + facts_of(machine) +
+      "<header>\n<h1>Speed against error</h1>\n<p class=soft>" + facts_of(machine) +
       "</p>\n<p>Every method of Hooke in every precision, on scenes whose answer is known: what does a given error "
       "cost? A point far down is accurate, a point far to the left is cheap; what lies on the Pareto front is beaten "
       "by nothing else.</p>\n<nav>";

@@ -112,20 +112,24 @@ std::string color_of(const std::string& method) {
   return kColors[i % kColors.size()];
 }
 
-const char* draw(const SceneReport& report, const std::filesystem::path& png) {
+const char* plot(const std::function<std::string(const std::string& png)>& script, const std::filesystem::path& png) {
   if (!have_gnuplot()) return "there is no gnuplot (apt-get install gnuplot-nox)";
-  if (curves(report).empty()) return nullptr;
   // By its part name first, as every other output.
   const std::filesystem::path part = io::part_name(png);
   std::string quoted;
   for (const char c : part.string()) quoted += c == '\'' ? "''" : std::string(1, c);
   std::FILE* pipe = popen("gnuplot -", "w");
   if (!pipe) return "gnuplot could not be started";
-  const std::string text = script(report, quoted);
+  const std::string text = script(quoted);
   std::fwrite(text.data(), 1, text.size(), pipe);
   std::error_code error;
   if (pclose(pipe) != 0 || (std::filesystem::rename(part, png, error), error)) return "gnuplot failed";
   return nullptr;
+}
+
+const char* draw(const SceneReport& report, const std::filesystem::path& png) {
+  if (curves(report).empty()) return have_gnuplot() ? nullptr : plot({}, png);
+  return plot([&](const std::string& path) { return script(report, path); }, png);
 }
 
 }  // namespace hooke::report

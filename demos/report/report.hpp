@@ -55,8 +55,22 @@ class Table {
   io::OutputFile file_;
 };
 
+/// Text as it stands in HTML.
+std::string escaped(const std::string& text);
+/// A number as people read it; a dash where there is none.
+std::string number(double value, const char* pattern = "%.3g");
+/// Processor, compiler, version and commit, in HTML.
+std::string facts_of(const Machine& machine);
+/// A page's beginning, up to and with <body>: title and style.
+std::string page_head(const std::string& title);
+
 /// One page that needs nothing but a browser.
 std::string page(const std::vector<SceneReport>& reports, const Machine& machine);
+
+/// Has gnuplot draw a picture; the file gets its name once it is complete.
+/// @param script from the picture's path, quoted for gnuplot, to gnuplot's commands
+/// @return why there is no picture, or nullptr
+const char* plot(const std::function<std::string(const std::string& png)>& script, const std::filesystem::path& png);
 
 /// A picture of a scene's plot, 1200 × 800 pixels, drawn by gnuplot.
 /// @return why there is no picture, or nullptr

@@ -32,13 +32,14 @@ struct Row {
   std::string hard, parameter;    ///< the case and its parameter
   std::string method, precision;  ///< the solver
   Outcome outcome = Outcome::Met;
-  double figure = kNone;         ///< what the case asks for, see Case::figure
-  double gate = kNone;           ///< most that the figure may be
-  double energy_growth = kNone;  ///< greatest rise above the start over the energy exchanged, its largest kinetic one
-  double jitter = kNone;         ///< RMS speed of free points at the end, where rest is due [m/s]
-  double failed_at = kNone;      ///< [s]
-  double simulated = 0;          ///< [s]
-  std::string said;              ///< by the library, or why there is no claim
+  double figure = kNone;  ///< what the case asks for, see Case::figure
+  double gate = kNone;    ///< most that the figure may be
+  double energy_growth =
+      kNone;                 ///< greatest rise above the start over the most that the motion turned into kinetic energy
+  double jitter = kNone;     ///< RMS speed of free points at the end, where rest is due [m/s]
+  double failed_at = kNone;  ///< [s]
+  double simulated = 0;      ///< [s]
+  std::string said;          ///< by the library, or why there is no claim
 
   bool bounded() const { return outcome == Outcome::Met || outcome == Outcome::Missed; }
   bool measured() const { return bounded() || outcome == Outcome::Broke; }
@@ -73,6 +74,9 @@ std::vector<std::pair<std::string, std::string>> left_out();
 /// Names of the solvers that the table compares.
 std::vector<std::string> solvers();
 
+/// What the table asks of a case: every parameter × solver × float and double.
+std::vector<Trial> trials(const Case& hard, bool thorough);
+
 /// Runs one row. What a body or scene refuses becomes Outcome::NotClaimed with its message.
 Row measure(const Case& hard, const Trial& trial);
 
@@ -86,6 +90,9 @@ class Table {
  private:
   io::OutputFile file_;
 };
+
+/// "16 rows: 12 met, …", of one case or of all.
+std::string summary(const std::vector<Row>& rows, const std::string& hard = "");
 
 /// One page that needs nothing but a browser, and the same as Markdown.
 std::string page(const std::vector<Case>& cases, const std::vector<Row>& rows, const report::Machine& machine);

@@ -138,8 +138,9 @@ bool Watch::left() const {
 void Watch::measure_energy() {
   const Energy energy = world_.energy();
   highest_ = std::max(highest_, energy.total());
-  exchanged_ = std::max(exchanged_, energy.kinetic);
-  row_.energy_growth = exchanged_ > 0 ? (highest_ - energy_start_) / exchanged_ : 0;
+  // What a motion that keeps its energy would have as kinetic one here: a blow-up does not count itself.
+  exchanged_ = std::max(exchanged_, energy_start_ - energy.gravitational - energy.elastic);
+  row_.energy_growth = (highest_ - energy_start_) / exchanged_;
 }
 
 bool Watch::run(double until) {
