@@ -77,6 +77,33 @@ RawPoints on_a_spring(const Vec3& x, const Vec3& v, double stiffness, double res
   return raw;
 }
 
+/// A box of points on springs along edges, face diagonals and body diagonals, around the origin.
+/// @param count points along x, y, z; 1 makes it flat
+RawPoints lattice(const std::array<int, 3>& count, double spacing, double mass, double stiffness) {
+  RawPoints raw;
+  const Index n = Index(count[0]) * count[1] * count[2];
+  const auto index = [&](int i, int j, int k) { return (k * count[1] + j) * count[0] + i; };
+  raw.points.resize(n, 3);
+  raw.velocities = Points<double>::Zero(n, 3);
+  raw.masses = Values<double>::Constant(n, mass / double(n));
+  for (int k = 0; k < count[2]; ++k)
+    for (int j = 0; j < count[1]; ++j)
+      for (int i = 0; i < count[0]; ++i) {
+        raw.points.row(index(i, j, k)) << spacing * (i - 0.5 * (count[0] - 1)), spacing * (j - 0.5 * (count[1] - 1)),
+            spacing * (k - 0.5 * (count[2] - 1));
+        // Half of the 26 neighbours: those that come later.
+        for (int dk = 0; dk <= 1; ++dk)
+          for (int dj = dk ? -1 : 0; dj <= 1; ++dj)
+            for (int di = dk || dj ? -1 : 1; di <= 1; ++di) {
+              const int a = i + di, b = j + dj, c = k + dk;
+              if (a < 0 || b < 0 || a >= count[0] || b >= count[1] || c >= count[2]) continue;
+              const double length = spacing * std::sqrt(double(di * di + dj * dj + dk * dk));
+              raw.network.springs.push_back({index(i, j, k), index(a, b, c), stiffness, 0, length});
+            }
+      }
+  return raw;
+}
+
 /// Adds v + ω × x to the velocities.
 void spin(RawPoints& raw, const Vec3& velocity, const Vec3& omega) {
   for (Index i = 0; i < raw.points.rows(); ++i) {
@@ -388,31 +415,6 @@ StandardScene settling_cloth() {
 }
 
 }  // namespace
-
-RawPoints lattice(const std::array<int, 3>& count, double spacing, double mass, double stiffness) {
-  RawPoints raw;
-  const Index n = Index(count[0]) * count[1] * count[2];
-  const auto index = [&](int i, int j, int k) { return (k * count[1] + j) * count[0] + i; };
-  raw.points.resize(n, 3);
-  raw.velocities = Points<double>::Zero(n, 3);
-  raw.masses = Values<double>::Constant(n, mass / double(n));
-  for (int k = 0; k < count[2]; ++k)
-    for (int j = 0; j < count[1]; ++j)
-      for (int i = 0; i < count[0]; ++i) {
-        raw.points.row(index(i, j, k)) << spacing * (i - 0.5 * (count[0] - 1)), spacing * (j - 0.5 * (count[1] - 1)),
-            spacing * (k - 0.5 * (count[2] - 1));
-        // Half of the 26 neighbours: those that come later.
-        for (int dk = 0; dk <= 1; ++dk)
-          for (int dj = dk ? -1 : 0; dj <= 1; ++dj)
-            for (int di = dk || dj ? -1 : 1; di <= 1; ++di) {
-              const int a = i + di, b = j + dj, c = k + dk;
-              if (a < 0 || b < 0 || a >= count[0] || b >= count[1] || c >= count[2]) continue;
-              const double length = spacing * std::sqrt(double(di * di + dj * dj + dk * dk));
-              raw.network.springs.push_back({index(i, j, k), index(a, b, c), stiffness, 0, length});
-            }
-      }
-  return raw;
-}
 
 SceneDescription hanging_sheet(int n) {
   SceneDescription d = empty("hanging-sheet-" + std::to_string(n), "", 0.5);

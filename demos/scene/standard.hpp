@@ -46,8 +46,4 @@ std::vector<StandardScene> standard_scenes();
 /// first row pinned, tilted by 45°.
 SceneDescription hanging_sheet(int n);
 
-/// A box of points on springs along edges, face diagonals and body diagonals, around the origin.
-/// @param count points along x, y, z; 1 makes it flat
-RawPoints lattice(const std::array<int, 3>& count, double spacing, double mass, double stiffness);
-
 }  // namespace hooke::scene

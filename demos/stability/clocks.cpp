@@ -42,7 +42,7 @@ Case variable_frames() {
     std::vector<std::uint64_t> hashes;
     for (const double rate : {240.0, 30.0, 60.0, 144.0, 0.0}) {
       scene::Scene scene = build(driven_sheet(), trial.solver);
-      Watch watch(scene.world, row, 10, true);
+      Watch watch(scene.world, row, 10, allowance(trial, 5));
       std::mt19937 random(1);
       std::uniform_real_distribution<double> any(0.0001, 0.05);
       watch.before = [&] { watch.frame = rate > 0 ? 1 / rate : any(random); };
@@ -77,13 +77,13 @@ Case moving_pins() {
     World& world = scene.world;
     Body& body = *world.bodies()[0];
     const Points<double> start = body.positions();
-    Watch watch(world, row, 200, trial.thorough);
+    Watch watch(world, row, 200, allowance(trial));
     double off = 0;
     if (trial.parameter == "teleport") {
       // Beside a twin that stays.
       scene::Scene twin = build(scene::hanging_sheet(8), trial.solver);
       Row row_of_twin;
-      Watch watch_twin(twin.world, row_of_twin, 200, trial.thorough);
+      Watch watch_twin(twin.world, row_of_twin, 200, allowance(trial));
       if (!watch.run(0.3) || !watch_twin.run(0.3)) return;
       const Points<double> x = body.positions();
       for (Index i = 0; i < body.size(); ++i)
@@ -91,7 +91,7 @@ Case moving_pins() {
       const double after = world.time() + 2 * world.clock().tick();
       if (!watch.run(after) || !watch_twin.run(after)) return;
       const Energy energy = twin.world.energy();
-      watch.judge(std::abs(world.energy().total() - energy.total()) / energy.kinetic, single ? 1e-3 : 1e-9);
+      judge(row, std::abs(world.energy().total() - energy.total()) / energy.kinetic, single ? 1e-3 : 1e-9);
       return;
     }
     if (trial.parameter == "jump") {
@@ -122,7 +122,7 @@ Case moving_pins() {
       };
       watch.run(1);
     }
-    watch.judge(off, 0);
+    judge(row, off, 0);
   };
   return hard;
 }
@@ -148,7 +148,7 @@ Case far_from_origin() {
       add_collider(d, "ball", Sphere{far + Vec3(0, -0.625, 0.25), 0.25});
       add_collider(d, "floor", HalfSpace{{0, 1, 0}, far.y() - 1});
       scene::Scene scene = build(d, trial.solver);
-      Watch watch(scene.world, row, 10, true);
+      Watch watch(scene.world, row, 10, allowance(trial, 5));
       if (!watch.run(2)) return;
       hashes.push_back(state_hash(scene.world));
     }
@@ -188,13 +188,13 @@ Case tiny_steps() {
     Solver solver = trial.solver;
     solver.dt = 1e-5;
     scene::Scene scene = build(d, solver);
-    Watch watch(scene.world, row, 1e4, true);
+    Watch watch(scene.world, row, 1e4, allowance(trial, 5));
     watch.run(seconds);
     const Vec3 moved = scene.world.bodies()[0]->displacement(0);
     const double wanted = drift ? 1e-3 * seconds : -0.5 * 9.81 * seconds * seconds;
     // The rounding of one position is not what is asked.
     const double ulp = trial.solver.precision == softbody::Precision::Float && drift ? 7.7e-6 : 0;
-    watch.judge(std::max(0.0, std::abs((drift ? moved.x() : moved.y()) - wanted) - ulp) / std::abs(wanted), 1e-3);
+    judge(row, std::max(0.0, std::abs((drift ? moved.x() : moved.y()) - wanted) - ulp) / std::abs(wanted), 1e-3);
   };
   return hard;
 }
@@ -248,22 +248,22 @@ Case long_run() {
       };
       const double before = kept();
       double worst = 0;
-      Watch watch(scene.world, row, 10, true);
+      Watch watch(scene.world, row, 10, allowance(trial, 5));
       watch.frame = 100 * scene.world.clock().tick();
       watch.look = [&] { worst = std::max(worst, std::abs(kept() / before - 1)); };
       watch.run(steps * solver.dt);
-      watch.judge(worst, 1e-3);
+      judge(row, worst, 1e-3);
       return;
     }
     scene::Scene probe = build(scene::hanging_sheet(6), {});
     const double dt = 0.5 * probe.bodies[0].body->stable_step(velocity_verlet());
     if (is_explicit(method)) solver.dt = dt;
     scene::Scene scene = build(scene::hanging_sheet(6), solver);
-    Watch watch(scene.world, row, 10, true);
+    Watch watch(scene.world, row, 10, allowance(trial, 5));
     watch.frame = 1;
     watch.energy = true;
     watch.run(0.1 * steps * dt);
-    watch.judge(row.energy_growth, 1e-3);
+    judge(row, row.energy_growth, 1e-3);
   };
   return hard;
 }

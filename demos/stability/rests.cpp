@@ -61,7 +61,7 @@ Case rest() {
   hard.run = [](const Trial& trial, Row& row) {
     const Resting resting = stability::resting(trial.parameter, trial.thorough);
     scene::Scene scene = build(resting.scene, trial.solver);
-    Watch watch(scene.world, row, 10, trial.thorough);
+    Watch watch(scene.world, row, 10, allowance(trial));
     double moving = 0;
     watch.look = [&] {
       if (rms_speed(scene.world) >= kStill) moving = scene.world.time();
@@ -69,13 +69,13 @@ Case rest() {
     watch.run(resting.within);
     row.jitter = rms_speed(scene.world);
     const Points<double> there = scene.world.bodies()[0]->positions();
-    watch.judge(moving, resting.within * (1 - 1e-6) - watch.frame);
+    judge(row, moving, resting.within * (1 - 1e-6) - watch.frame);
     if (row.outcome != Outcome::Met || !trial.thorough) return;
     if (!watch.run(600)) return;
     row.jitter = rms_speed(scene.world);
     const double drift = (scene.world.bodies()[0]->positions() - there).abs().maxCoeff();
     row.said = format("moved by %.2g m in the minutes after", drift);
-    watch.judge(moving, resting.within);
+    judge(row, moving, resting.within);
     if (drift > 1e-6) row.outcome = Outcome::Missed;
   };
   return hard;
@@ -102,10 +102,10 @@ Case energy() {
       }
       return std::move(build(*standard.description, trial.solver).world);
     }();
-    Watch watch(world, row, 1e5, trial.thorough);
+    Watch watch(world, row, 1e5, allowance(trial));
     watch.energy = true;
     watch.run(seconds);
-    watch.judge(row.energy_growth, 1e-3);
+    judge(row, row.energy_growth, 1e-3);
   };
   return hard;
 }

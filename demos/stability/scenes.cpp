@@ -1,5 +1,6 @@
 #include "scenes.hpp"
 
+#include <hooke/softbody/lattice.hpp>
 #include <scene/scene.hpp>
 
 #include <cmath>
@@ -116,9 +117,40 @@ SceneDescription hammock(int n) {
 }
 
 scene::RawPoints jelly(int count, double height, double stiffness) {
-  scene::RawPoints raw = scene::lattice({count, count, count}, 0.2 / (count - 1), 1, stiffness);
+  softbody::FixedLatticeMaterial material;
+  material.stiffness = stiffness;
+  softbody::Lattice box = softbody::lattice_from_box(Vec3::Constant(0.2), {count, count, count}, material);
+  scene::RawPoints raw;
+  raw.points = box.positions;
   raw.points.col(1) += height + 0.1;
+  raw.velocities = Points<double>::Zero(raw.points.rows(), 3);
+  raw.masses = box.masses;
+  raw.network = *box.network;
+  // As it is now, wherever a case puts the points.
+  const std::vector<double> rest = softbody::rest_lengths(raw.network, raw.points);
+  for (std::size_t i = 0; i < rest.size(); ++i) raw.network.springs[i].rest_length = rest[i];
   return raw;
+}
+
+std::vector<SceneDescription> hashed_scenes() {
+  std::vector<SceneDescription> out;
+  SceneDescription sheet = empty_scene("damped-sheet", 0.5);
+  scene::SoftBody& cloth = add_body(sheet, "cloth", {});
+  cloth.form = scene::Grid{1, 1, 8, 8, {1, 0, 0}, {0, 0, 1}};
+  cloth.pin = {"top"};
+  out.push_back(sheet);
+
+  cloth.pin = {"top-left"};
+  cloth.thickness = 0.01;
+  sheet.file = "damped-sheet-on-sphere";
+  add_collider(sheet, "ball", Sphere{{0, -0.25, 0.5}, 0.25});
+  out.push_back(std::move(sheet));
+
+  SceneDescription fall = empty_scene("jelly-on-floor", 0.5);
+  add_body(fall, "jelly", jelly(4, 0.05));
+  add_collider(fall, "floor", HalfSpace{}, 0.5);
+  out.push_back(std::move(fall));
+  return out;
 }
 
 }  // namespace hooke::stability

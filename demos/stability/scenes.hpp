@@ -27,8 +27,12 @@ scene::SceneDescription hard_sheet(int n, double stiffness, double ratio);
 /// A square metre of one cloth, pinned along two opposite edges, level at the start; damped to rest.
 scene::SceneDescription hammock(int n);
 
-/// A cube of `count`³ points, 0.2 m, 1 kg, joined along edges, face diagonals and body diagonals, k = 2000 N/m,
-/// its lowest points at `height`, centred over the origin.
+/// The classical cube of springs: `count`³ points, 0.2 m, 1 kg, one stiffness [N/m] and the default damping, its
+/// lowest points at `height`, centred over the origin.
 scene::RawPoints jelly(int count, double height, double stiffness = 2000);
+
+/// Scenes whose state is compared bit by bit: springs with dampers, which no vector kernel moves, and no function
+/// of the mathematics library but roots.
+std::vector<scene::SceneDescription> hashed_scenes();
 
 }  // namespace hooke::stability

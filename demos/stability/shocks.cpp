@@ -39,9 +39,9 @@ Case coincident_points() {
     d.gravity.setZero();
     add_body(d, "points", raw);
     scene::Scene scene = build(d, trial.solver);
-    Watch watch(scene.world, row, 10, trial.thorough);
+    Watch watch(scene.world, row, 10, allowance(trial));
     watch.run(2);
-    watch.judge((scene.world.bodies()[0]->positions() - raw.points).abs().maxCoeff(), 0);
+    judge(row, (scene.world.bodies()[0]->positions() - raw.points).abs().maxCoeff(), 0);
   };
   return hard;
 }
@@ -58,19 +58,20 @@ Case collapsed_start() {
   hard.title = "Collapsed start: a jelly pressed flat, or in disorder";
   hard.problem =
       "A jelly of 5 × 5 × 5 points, 0.2 m, 1 kg, k = 2000 N/m, floats without weight. Flat: pressed to a millionth of "
-      "its height, so that springs can just tell up from down. Disorder: every point anywhere in the cube. Damped.";
-  hard.figure = "flat: volume lost after 10 s, as a share";
-  hard.gate = "finite after 10 s; flat: 95 % of its volume again";
-  hard.parameters = {"flat", "disorder"};
+      "its height, so that springs can just tell up from down; layers shoot through each other and may stay folded, "
+      "which the springs "
+      "take for rest. Half: pressed to half its height. Disorder: every point anywhere in the cube.";
+  hard.figure = "volume lost after 10 s, as a share; only half has a gate for it";
+  hard.gate = "finite after 10 s; half: its volume again within 1 %";
+  hard.parameters = {"half", "flat", "disorder"};
   hard.run = [](const Trial& trial, Row& row) {
     SceneDescription d = empty_scene("collapsed", 10);
     d.gravity.setZero();
-    d.damping = 0.9;
     RawPoints raw = jelly(5, 0);
     const double whole = spread(raw.points);
-    const bool flat = trial.parameter == "flat";
-    if (flat) {
-      raw.points.col(1) *= 1e-6;
+    const bool half = trial.parameter == "half";
+    if (trial.parameter != "disorder") {
+      raw.points.col(1) *= half ? 0.5 : 1e-6;
     } else {
       std::mt19937 random(5);
       std::uniform_real_distribution<double> place(0, 0.2);
@@ -78,14 +79,14 @@ Case collapsed_start() {
     }
     add_body(d, "jelly", raw);
     scene::Scene scene = build(d, trial.solver);
-    Watch watch(scene.world, row, 10, trial.thorough);
+    Watch watch(scene.world, row, 10, allowance(trial));
     watch.energy = true;
     watch.run(10);
     row.jitter = rms_speed(scene.world);
-    if (flat)
-      watch.judge(1 - spread(scene.world.bodies()[0]->positions()) / whole, 0.05);
-    else
-      watch.judge();
+    const double lost = 1 - spread(scene.world.bodies()[0]->positions()) / whole;
+    if (half) return judge(row, std::abs(lost), 0.01);
+    judge(row);
+    if (row.bounded()) row.figure = lost;
   };
   return hard;
 }
@@ -103,8 +104,6 @@ Case over_stretched() {
   hard.run = [](const Trial& trial, Row& row) {
     SceneDescription d = scene::hanging_sheet(12);
     RawPoints raw = points_of(d);
-    const std::vector<double> rest = softbody::rest_lengths(raw.network, raw.points);
-    for (std::size_t i = 0; i < rest.size(); ++i) raw.network.springs[i].rest_length = rest[i];
     raw.points *= 10;
     // Wind needs triangles, and a grid has them: the same sheet, its points put elsewhere.
     d.bodies[0].wind = softbody::Wind{};
@@ -113,9 +112,9 @@ Case over_stretched() {
     scene::Scene scene = build(d, trial.solver);
     Body& body = *scene.world.bodies()[0];
     for (Index i = 0; i < body.size(); ++i) body.set_position(i, raw.points.row(i).matrix().transpose());
-    Watch watch(scene.world, row, 100, trial.thorough);
+    Watch watch(scene.world, row, 100, allowance(trial));
     watch.run(trial.thorough ? 10 : 2);
-    watch.judge();
+    judge(row);
     if (row.bounded()) row.figure = scene::worst_stretch(scene);
   };
   return hard;
@@ -147,7 +146,7 @@ Case huge_velocity() {
     if (trial.parameter == "sphere") add_collider(d, "sphere", ball);
     if (trial.parameter == "wall") add_collider(d, "wall", Box{{0, 0, 0}, {2, 0.0005, 2}});
     scene::Scene scene = build(d, trial.solver);
-    Watch watch(scene.world, row, 500, trial.thorough);
+    Watch watch(scene.world, row, 500, allowance(trial));
     double beyond = 0;
     watch.look = [&] {
       const Points<double> x = scene.world.bodies()[0]->positions();
@@ -162,7 +161,7 @@ Case huge_velocity() {
       beyond = std::max(beyond, now);
     };
     watch.run(0.1);
-    watch.judge(beyond, 0);
+    judge(row, beyond, 0);
   };
   return hard;
 }
@@ -182,11 +181,11 @@ Case initial_overlap() {
     add_body(d, "jelly", jelly(6, -0.1));
     add_collider(d, "floor", HalfSpace{}, 0.5);
     scene::Scene scene = build(d, trial.solver);
-    Watch watch(scene.world, row, 10, trial.thorough);
+    Watch watch(scene.world, row, 10, allowance(trial));
     double fastest = 0;
     watch.look = [&] { fastest = std::max(fastest, rms_speed(scene.world)); };
     watch.run(1);
-    watch.judge(fastest, 2 * Contacts<double>::kPushSpeed);
+    judge(row, fastest, 2 * Contacts<double>::kPushSpeed);
     const double lowest = scene.world.bodies()[0]->positions().col(1).minCoeff();
     if (row.bounded() && lowest < -1e-3) {
       row.outcome = Outcome::Missed;

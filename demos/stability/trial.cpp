@@ -11,8 +11,8 @@ namespace hooke::stability {
 
 namespace {
 
-// Forces of springs, counted, that a row may cost.
-constexpr double kAllowed = 6e7, kThoroughFactor = 200;
+constexpr double kAllowed = 1e8, kThoroughFactor = 200;
+constexpr double kImplicitWork = 6;  // of a force or product in a solve, where gradients come on top
 
 double dot(const Points<double>& a, const Points<double>& b) { return (a * b).sum(); }
 
@@ -90,12 +90,11 @@ double rms_speed(const World& world) {
   return count ? std::sqrt(sum / double(count)) : 0;
 }
 
-Watch::Watch(World& world, Row& row, double reach, bool thorough)
-    : world_(world), row_(row), reach_(reach), allowed_(kAllowed * (thorough ? kThoroughFactor : 1)) {
-  for (const auto& body : world.bodies()) {
-    start_.push_back(body->positions());
-    springs_ += 4.0 * double(body->size());  // about as many as a grid has
-  }
+double allowance(const Trial& trial, double share) { return share * kAllowed * (trial.thorough ? kThoroughFactor : 1); }
+
+Watch::Watch(World& world, Row& row, double reach, double allowed)
+    : world_(world), row_(row), reach_(reach), allowed_(allowed) {
+  for (const auto& body : world.bodies()) start_.push_back(body->positions());
   const Energy energy = world.energy();
   energy_start_ = highest_ = energy.total();
   exchanged_ = energy.kinetic;
@@ -105,7 +104,8 @@ double Watch::work() const {
   double sum = 0;
   for (const auto& body : world_.bodies()) {
     const MotionFacts facts = body->motion_facts();
-    sum += double(facts.evaluations + 2 * facts.products) * 4 * double(body->size());
+    const double each = is_explicit(facts.method) ? 1 : kImplicitWork;
+    sum += each * double(facts.evaluations + 2 * facts.products) * 4 * double(body->size());
   }
   return sum;
 }
@@ -172,15 +172,15 @@ bool Watch::run(double until) {
   return true;
 }
 
-void Watch::judge(double figure, double gate) {
-  row_.gate = gate;
-  if (!row_.measured()) return;
-  row_.figure = figure;
-  if (row_.bounded()) row_.outcome = figure <= gate ? Outcome::Met : Outcome::Missed;
+void judge(Row& row, double figure, double gate) {
+  row.gate = gate;
+  if (!row.measured()) return;
+  row.figure = figure;
+  if (row.bounded()) row.outcome = figure <= gate ? Outcome::Met : Outcome::Missed;
 }
 
-void Watch::judge() {
-  if (row_.bounded()) row_.outcome = Outcome::Met;
+void judge(Row& row) {
+  if (row.bounded()) row.outcome = Outcome::Met;
 }
 
 Balance balance_of(const scene::SceneBody& body, const Vec3& gravity) {

@@ -30,12 +30,17 @@ bool is_explicit(const std::string& method);
 
 double rms_speed(const World& world);  ///< of free points [m/s]
 
+/// Work that a row may cost, in forces of springs of explicit methods; about 1e9 a second. More in the long form.
+/// Counted, not timed: the same rows are too dear on every machine.
+double allowance(const Trial& trial, double share = 1);
+constexpr double kAnyWork = 1e300;
+
 /// Runs a world frame by frame and takes down what every case asks.
 class Watch {
  public:
   /// @param reach points that are farther from their start have left the scene [m]
-  /// @param thorough allows a hundred times the work
-  Watch(World& world, Row& row, double reach, bool thorough);
+  /// @param allowed work, see allowance
+  Watch(World& world, Row& row, double reach, double allowed);
 
   double frame = 1.0 / 60;       ///< [s]
   bool energy = false;           ///< take down the energy's growth
@@ -44,10 +49,6 @@ class Watch {
 
   /// Up to world time `until` [s]; false where it ended before.
   bool run(double until);
-  /// Sets the figure and whether it meets the gate. Rows that broke stay broken.
-  void judge(double figure, double gate);
-  /// Bounded is all that is asked.
-  void judge();
 
  private:
   bool refuse_if_too_dear(double seconds);
@@ -60,8 +61,12 @@ class Watch {
   double reach_, allowed_;
   std::vector<Points<double>> start_;
   double energy_start_ = 0, highest_ = 0, exchanged_ = 0;
-  double springs_ = 0;
 };
+
+/// Sets the figure and whether it meets the gate. Rows that broke stay broken.
+void judge(Row& row, double figure, double gate);
+/// Bounded is all that is asked.
+void judge(Row& row);
 
 /// Where springs and weight balance.
 struct Balance {
