@@ -118,20 +118,23 @@ Case over_stiff() {
     scene::Scene scene = build(d, solver);
     Watch watch(scene.world, row, 10, allowance(trial));
     watch.energy = true;
+    double lost_at = std::numeric_limits<double>::infinity();
+    watch.look = [&] {
+      row.figure = scene::worst_stretch(scene);
+      if (!(row.figure < 1)) lost_at = std::min(lost_at, scene.world.time());
+    };
     watch.run(trial.thorough ? 5 : 0.5);
     if (coarse && is_explicit(solver.method)) {
-      // Told before it was lost: what stopped it names the step, and the state is that of a sheet.
-      const bool told = row.said.find("largest stable") != std::string::npos;
-      const bool lost = !(scene::worst_stretch(scene) < 1);
-      row.figure = scene::worst_stretch(scene);
-      if (told && !lost)
+      // Told before it was lost, it may stop or go on: the user knows.
+      if (watch.told_at < lost_at - 1e-9) {
         row.outcome = Outcome::Met;
-      else if (told)
-        row.said = "only after the motion was lost: " + row.said;
+      } else if (row.outcome != Outcome::TooDear) {
+        row.outcome = Outcome::Broke;
+        row.failed_at = std::min(lost_at, scene.world.time());
+      }
       return;
     }
     judge(row);
-    if (row.bounded()) row.figure = scene::worst_stretch(scene);
   };
   return hard;
 }
@@ -188,7 +191,7 @@ Case hard_bar(const char* name, const char* title, const char* problem, const ch
     Strains strains;
     strains_of(scene, row, until, until, allowance(trial, 5), strains);
     judge(row, std::abs(strains.early / wanted() - 1), allowed);
-    if (row.bounded()) row.said = format("worst strain %.4g, converged %.4g", strains.early, wanted());
+    if (row.bounded()) row.said += format("worst strain %.4g, converged %.4g", strains.early, wanted());
   };
   return hard;
 }

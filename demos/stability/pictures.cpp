@@ -23,7 +23,7 @@ const char* color_of(Outcome outcome) {
   }
 }
 
-std::string quoted(const std::string& text) {
+std::string in_quotes(const std::string& text) {
   std::string out = "'";
   for (const char c : text) out += c == '\'' ? "''" : std::string(1, c);
   return out + "'";
@@ -72,10 +72,10 @@ std::string script(const std::vector<Row>& rows, const std::string& png) {
   out += text;
   out += "set x2tics (";
   for (std::size_t i = 0; i < columns.size(); ++i)
-    out += (i ? "," : "") + quoted(columns[i]) + " " + std::to_string(double(i) + 0.5);
+    out += (i ? "," : "") + in_quotes(columns[i]) + " " + std::to_string(double(i) + 0.5);
   out += ")\nset x2range [0:" + std::to_string(width) + "]\nunset xtics\nset ytics (";
   for (std::size_t i = 0; i < lines.size(); ++i)
-    out += (i ? "," : "") + quoted(lines[i]) + " " + std::to_string(-double(i) - 0.5);
+    out += (i ? "," : "") + in_quotes(lines[i]) + " " + std::to_string(-double(i) - 0.5);
   out += ")\n" + boxes;
   // What the colours mean.
   double x = 0;
@@ -89,8 +89,8 @@ std::string script(const std::vector<Row>& rows, const std::string& png) {
                   "set object %d rectangle from %.3f,%.3f to %.3f,%.3f fs solid noborder fc rgb '%s'\n", ++object, x,
                   -height - 1.25, x + 0.2, -height - 0.7, color_of(outcome));
     out += text;
-    out +=
-        "set label " + quoted(what) + " at " + std::to_string(x + 0.26) + "," + std::to_string(-height - 0.97) + "\n";
+    out += "set label " + in_quotes(what) + " at " + std::to_string(x + 0.26) + "," + std::to_string(-height - 0.97) +
+           "\n";
     x += width / 5;
   }
   return out + "plot NaN notitle\n";

@@ -16,6 +16,18 @@ constexpr double kImplicitWork = 6;  // of a force or product in a solve, where 
 
 double dot(const Points<double>& a, const Points<double>& b) { return (a * b).sum(); }
 
+template <class W>
+std::vector<StepReport> warnings_of(W& world) {
+  if constexpr (requires { world.take_warnings(); }) return world.take_warnings();
+  return {};
+}
+
+template <class B>
+bool sleeps(const B& body) {
+  if constexpr (requires { body.asleep(); }) return body.asleep();
+  return false;
+}
+
 }  // namespace
 
 const char* name_of(Outcome outcome) {
@@ -92,12 +104,16 @@ double rms_speed(const World& world) {
 
 double allowance(const Trial& trial, double share) { return share * kAllowed * (trial.thorough ? kThoroughFactor : 1); }
 
+bool asleep(const World& world) {
+  return std::all_of(world.bodies().begin(), world.bodies().end(), [](const auto& body) { return sleeps(*body); });
+}
+
 Watch::Watch(World& world, Row& row, double reach, double allowed)
     : world_(world), row_(row), reach_(reach), allowed_(allowed) {
   for (const auto& body : world.bodies()) start_.push_back(body->positions());
-  const Energy energy = world.energy();
-  energy_start_ = highest_ = energy.total();
-  exchanged_ = energy.kinetic;
+  const Energy start = world.energy();
+  energy_start_ = highest_ = start.total();
+  exchanged_ = start.kinetic;
 }
 
 double Watch::work() const {
@@ -136,11 +152,18 @@ bool Watch::left() const {
 }
 
 void Watch::measure_energy() {
-  const Energy energy = world_.energy();
-  highest_ = std::max(highest_, energy.total());
+  const Energy now = world_.energy();
+  highest_ = std::max(highest_, now.total());
   // What a motion that keeps its energy would have as kinetic one here: a blow-up does not count itself.
-  exchanged_ = std::max(exchanged_, energy_start_ - energy.gravitational - energy.elastic);
+  exchanged_ = std::max(exchanged_, energy_start_ - now.gravitational - now.elastic);
   row_.energy_growth = (highest_ - energy_start_) / exchanged_;
+}
+
+void Watch::listen(const StepReport& report) {
+  const std::string text = report.text();
+  if (row_.said.find(text) == std::string::npos && row_.said.size() < 400)
+    row_.said += (row_.said.empty() ? "" : "; ") + text;
+  if (std::isnan(told_at) && text.find("largest stable") != std::string::npos) told_at = report.time;
 }
 
 bool Watch::run(double until) {
@@ -149,23 +172,24 @@ bool Watch::run(double until) {
     if (before) before();
     const StepReport report = world_.update(std::min(frame, until - world_.time()));
     row_.simulated = world_.time();
+    for (const StepReport& warning : warnings_of(world_)) listen(warning);
     if (!report.good()) {
       row_.outcome = Outcome::Broke;
       row_.failed_at = report.time;
-      row_.said = report.text();
+      listen(report);
       return false;
     }
     if (energy) measure_energy();
     if (left()) {
       row_.outcome = Outcome::Broke;
       row_.failed_at = world_.time();
-      row_.said = format("left the scene by more than %g m and nothing was said", reach_);
+      if (row_.said.empty()) row_.said = format("left the scene by more than %g m and nothing was said", reach_);
       return false;
     }
     if (look) look();
     if (work() > allowed_ && world_.time() < until - 1e-9) {
       row_.outcome = Outcome::TooDear;
-      row_.said = format("%.1e spring forces were spent after %.3g of %.3g s", work(), world_.time(), until);
+      row_.said += format("%.1e spring forces were spent after %.3g of %.3g s", work(), world_.time(), until);
       return false;
     }
   }

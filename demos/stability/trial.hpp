@@ -29,6 +29,7 @@ struct NoClaim {
 bool is_explicit(const std::string& method);
 
 double rms_speed(const World& world);  ///< of free points [m/s]
+bool asleep(const World& world);       ///< all bodies
 
 /// Work that a row may cost, in forces of springs of explicit methods; about 1e9 a second. More in the long form.
 /// Counted, not timed: the same rows are too dear on every machine.
@@ -47,6 +48,8 @@ class Watch {
   std::function<void()> look;    ///< after every frame
   std::function<void()> before;  ///< before every frame
 
+  double told_at = kNone;  ///< [s], when the library first named the largest stable step
+
   /// Up to world time `until` [s]; false where it ended before.
   bool run(double until);
 
@@ -54,6 +57,7 @@ class Watch {
   bool refuse_if_too_dear(double seconds);
   double work() const;
   bool left() const;
+  void listen(const StepReport& report);
   void measure_energy();
 
   World& world_;
