@@ -16,6 +16,15 @@ constexpr double kImplicitWork = 6;  // of a force or product in a solve, where 
 
 double dot(const Points<double>& a, const Points<double>& b) { return (a * b).sum(); }
 
+// The total energy [J], of filtered leapfrog the one that it keeps.
+double energy_of(const World& world) {
+  double sum = 0;
+  for (const auto& body : world.bodies())
+    sum += softbody::filtered_facts(*body) ? softbody::filtered_energy(*body, world.gravity())
+                                           : body->energy(world.gravity()).total();
+  return sum;
+}
+
 template <class W>
 std::vector<StepReport> warnings_of(W& world) {
   if constexpr (requires { world.take_warnings(); }) return world.take_warnings();
@@ -111,9 +120,8 @@ bool asleep(const World& world) {
 Watch::Watch(World& world, Row& row, double reach, double allowed)
     : world_(world), row_(row), reach_(reach), allowed_(allowed) {
   for (const auto& body : world.bodies()) start_.push_back(body->positions());
-  const Energy start = world.energy();
-  energy_start_ = highest_ = start.total();
-  exchanged_ = start.kinetic;
+  energy_start_ = highest_ = energy_of(world);
+  exchanged_ = world.energy().kinetic;
 }
 
 double Watch::work() const {
@@ -153,7 +161,7 @@ bool Watch::left() const {
 
 void Watch::measure_energy() {
   const Energy now = world_.energy();
-  highest_ = std::max(highest_, now.total());
+  highest_ = std::max(highest_, energy_of(world_));
   // What a motion that keeps its energy would have as kinetic one here: a blow-up does not count itself.
   exchanged_ = std::max(exchanged_, energy_start_ - now.gravitational - now.elastic);
   row_.energy_growth = (highest_ - energy_start_) / exchanged_;
@@ -180,13 +188,13 @@ bool Watch::run(double until) {
       return false;
     }
     if (energy) measure_energy();
+    if (look) look();
     if (left()) {
       row_.outcome = Outcome::Broke;
       row_.failed_at = world_.time();
       if (row_.said.empty()) row_.said = format("left the scene by more than %g m and nothing was said", reach_);
       return false;
     }
-    if (look) look();
     if (work() > allowed_ && world_.time() < until - 1e-9) {
       row_.outcome = Outcome::TooDear;
       row_.said += format("%.1e spring forces were spent after %.3g of %.3g s", work(), world_.time(), until);
