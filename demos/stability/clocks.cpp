@@ -44,7 +44,7 @@ Case variable_frames() {
     std::vector<std::uint64_t> hashes;
     for (const double rate : {240.0, 30.0, 60.0, 144.0, 0.0}) {
       scene::Scene scene = build(driven_sheet(), trial.solver);
-      Watch watch(scene.world, row, 10, allowance(trial, 5));
+      Watch watch(scene.world, row, 10, allowance(trial, 3));
       std::mt19937 random(1);
       std::uniform_real_distribution<double> any(0.0001, 0.05);
       watch.before = [&] { watch.frame = rate > 0 ? 1 / rate : any(random); };
@@ -148,7 +148,7 @@ Case far_from_origin() {
       add_collider(d, "ball", Sphere{far + Vec3(0, -0.625, 0.25), 0.25});
       add_collider(d, "floor", HalfSpace{{0, 1, 0}, far.y() - 1});
       scene::Scene scene = build(d, trial.solver);
-      Watch watch(scene.world, row, 10, allowance(trial, 5));
+      Watch watch(scene.world, row, 10, allowance(trial, 3));
       if (!watch.run(2)) return;
       hashes.push_back(state_hash(scene.world));
     }
@@ -188,7 +188,7 @@ Case tiny_steps() {
     Solver solver = trial.solver;
     solver.dt = 1e-5;
     scene::Scene scene = build(d, solver);
-    Watch watch(scene.world, row, 1e4, allowance(trial, 5));
+    Watch watch(scene.world, row, 1e4, allowance(trial, 3));
     watch.run(seconds);
     const Vec3 moved = scene.world.bodies()[0]->displacement(0);
     const double wanted = drift ? 1e-3 * seconds : -0.5 * 9.81 * seconds * seconds;
@@ -248,7 +248,7 @@ Case long_run() {
       };
       const double before = kept();
       double worst = 0;
-      Watch watch(scene.world, row, 10, allowance(trial, 5));
+      Watch watch(scene.world, row, 10, allowance(trial, 3));
       watch.frame = 100 * scene.world.clock().tick();
       watch.look = [&] { worst = std::max(worst, std::abs(kept() / before - 1)); };
       watch.run(steps * solver.dt);
@@ -259,7 +259,7 @@ Case long_run() {
     const double dt = 0.5 * probe.bodies[0].body->stable_step(velocity_verlet());
     if (is_explicit(method)) solver.dt = dt;
     scene::Scene scene = build(scene::hanging_sheet(6), solver);
-    Watch watch(scene.world, row, 10, allowance(trial, 5));
+    Watch watch(scene.world, row, 10, allowance(trial, 3));
     watch.frame = 0.1;
     watch.energy = true;
     watch.run(0.1 * steps * dt);

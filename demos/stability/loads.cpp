@@ -42,7 +42,7 @@ void settle_and_compare(const SceneDescription& d, double seconds, double gate, 
     std::iota(way.begin(), way.end(), 0);
   }
   const double wanted = elongation(body, balance_of(body, scene.world.gravity()).positions, way);
-  Watch watch(scene.world, row, 100, allowance(trial, seconds > 10 ? 5 : 1));
+  Watch watch(scene.world, row, 100, allowance(trial, seconds > 10 ? 3 : 1));
   watch.run(seconds);
   row.jitter = rms_speed(scene.world);
   judge(row, std::abs(elongation(body, body.body->positions(), way) / wanted - 1), gate);
@@ -157,7 +157,7 @@ bool strains_of(scene::Scene& scene, Row& row, double split, double until, doubl
 // By a method of order 6 in double, its steps halved until the strain moves by less than a hundredth.
 double converged_strain(const SceneDescription& d, double until) {
   double before = -1;
-  for (double share = 0.5;; share /= 2) {
+  for (double share = 0.9;; share /= 2) {
     Solver solver;
     solver.method = blanes_moan_6().name;
     solver.precision = softbody::Precision::Double;
@@ -189,7 +189,7 @@ Case hard_bar(const char* name, const char* title, const char* problem, const ch
   hard.run = [=](const Trial& trial, Row& row) {
     scene::Scene scene = build(hard_sheet(kHardPoints, stiffness, ratio), trial.solver);
     Strains strains;
-    strains_of(scene, row, until, until, allowance(trial, 5), strains);
+    strains_of(scene, row, until, until, allowance(trial, 3), strains);
     judge(row, std::abs(strains.early / wanted() - 1), allowed);
     if (row.bounded()) row.said += format("worst strain %.4g, converged %.4g", strains.early, wanted());
   };
@@ -225,7 +225,7 @@ Case hard_stiff_later() {
   hard.run = [](const Trial& trial, Row& row) {
     scene::Scene scene = build(hard_sheet(kHardPoints, kStiff, 1), trial.solver);
     Strains strains;
-    strains_of(scene, row, 0.5, trial.thorough ? 5 : 1, allowance(trial, 5), strains);
+    strains_of(scene, row, 0.5, trial.thorough ? 5 : 1, allowance(trial, 3), strains);
     judge(row, strains.late, 1e-3);
   };
   return hard;

@@ -12,7 +12,7 @@ namespace hooke::stability {
 namespace {
 
 constexpr double kAllowed = 1e8, kThoroughFactor = 200;
-constexpr double kImplicitWork = 6;  // of a force or product in a solve, where gradients come on top
+constexpr double kImplicitWork = 16;  // of a force or product in a solve, where gradients come on top
 
 double dot(const Points<double>& a, const Points<double>& b) { return (a * b).sum(); }
 
