@@ -32,16 +32,26 @@ std::vector<Index> last_column(Index points) {
   return out;
 }
 
-void settle_and_compare(const SceneDescription& d, double seconds, double gate, const Trial& trial, Row& row,
-                        bool chain) {
-  scene::Scene scene = build(d, trial.solver);
-  const scene::SceneBody& body = scene.bodies[0];
+std::vector<Index> way_of(const scene::SceneBody& body, bool chain) {
   std::vector<Index> way = last_column(body.body->size());
   if (chain) {
     way.resize(std::size_t(body.body->size()));
     std::iota(way.begin(), way.end(), 0);
   }
-  const double wanted = elongation(body, balance_of(body, scene.world.gravity()).positions, way);
+  return way;
+}
+
+double balanced_elongation(const SceneDescription& d, bool chain) {
+  const scene::Scene scene = build(d, {});
+  const scene::SceneBody& body = scene.bodies[0];
+  return elongation(body, balance_of(body, scene.world.gravity()).positions, way_of(body, chain));
+}
+
+void settle_and_compare(const SceneDescription& d, double seconds, double gate, const Trial& trial, Row& row,
+                        bool chain, double wanted) {
+  scene::Scene scene = build(d, trial.solver);
+  const scene::SceneBody& body = scene.bodies[0];
+  const std::vector<Index> way = way_of(body, chain);
   Watch watch(scene.world, row, 100, allowance(trial, seconds > 10 ? 3 : 1));
   watch.run(seconds);
   row.jitter = rms_speed(scene.world);
@@ -62,7 +72,8 @@ Case mass_ratio(bool chain) {
   hard.parameters = {"10", "100", "1000", "10000"};
   hard.run = [chain](const Trial& trial, Row& row) {
     const double ratio = std::stod(trial.parameter);
-    settle_and_compare(chain ? heavy_chain(ratio) : heavy_sheet(ratio), 5, 0.01, trial, row, chain);
+    const SceneDescription d = chain ? heavy_chain(ratio) : heavy_sheet(ratio);
+    settle_and_compare(d, 5, 0.01, trial, row, chain, balanced_elongation(d, chain));
   };
   return hard;
 }
@@ -206,10 +217,11 @@ Case hard_settled() {
   hard.figure = "stretch of the column above the corner against the static answer, relative error";
   hard.gate = "within 5 % of the static answer";
   hard.parameters = {""};
-  hard.run = [](const Trial& trial, Row& row) {
+  const auto wanted = once<double>([] { return balanced_elongation(hard_sheet(kHardPoints, 1, kHeavy), false); });
+  hard.run = [wanted](const Trial& trial, Row& row) {
     SceneDescription d = hard_sheet(kHardPoints, 1, kHeavy);
     d.damping = 0.63;
-    settle_and_compare(d, 20, 0.05, trial, row, false);
+    settle_and_compare(d, 20, 0.05, trial, row, false, wanted());
   };
   return hard;
 }
