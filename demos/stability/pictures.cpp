@@ -67,7 +67,8 @@ std::string script(const std::vector<Row>& rows, const std::string& png) {
   out += "set output '" + png + "'\nunset key\nunset border\nset tics scale 0\n";
   out += "set title 'Hard cases by solver: left half float, right half double' font ',16' offset 0,1.2\n";
   char text[200];
-  std::snprintf(text, sizeof text, "set xrange [0:%g]\nset yrange [%g:0]\nset lmargin 44\nset bmargin 4\n", width,
+  std::snprintf(text, sizeof text,
+                "set xrange [0:%g]\nset yrange [%g:0]\nset lmargin 44\nset bmargin 4\nset tmargin 6\n", width,
                 -height - 1.4);
   out += text;
   out += "set x2tics (";
@@ -81,7 +82,7 @@ std::string script(const std::vector<Row>& rows, const std::string& png) {
   double x = 0;
   for (const Outcome outcome : {Outcome::Met, Outcome::Missed, Outcome::Broke, Outcome::NotClaimed, Outcome::TooDear}) {
     const std::string what = outcome == Outcome::Met          ? "bounded, gate met"
-                             : outcome == Outcome::Missed     ? "bounded, gate missed (figure)"
+                             : outcome == Outcome::Missed     ? "gate missed (figure)"
                              : outcome == Outcome::Broke      ? "broke (when)"
                              : outcome == Outcome::NotClaimed ? "not claimed"
                                                               : "too dear";

@@ -128,7 +128,7 @@ double Watch::work() const {
   double sum = 0;
   for (const auto& body : world_.bodies()) {
     const MotionFacts facts = body->motion_facts();
-    const double each = is_explicit(facts.method) ? 1 : kImplicitWork;
+    const double each = facts.method.starts_with("implicit") ? kImplicitWork : 1;
     sum += each * double(facts.evaluations + 2 * facts.products) * 4 * double(body->size());
   }
   return sum;
@@ -243,7 +243,7 @@ Balance balance_of(const scene::SceneBody& body, const Vec3& gravity) {
   double held = total;
   for (int step = 0; step < 3000; ++step) {
     out.residual = f.matrix().rowwise().norm().maxCoeff() / total;
-    if (out.residual < 1e-10) break;
+    if (out.residual < 1e-10 || (step > 300 && out.residual < 1e-6)) break;
     Points<double> d = Points<double>::Zero(n, 3), r = f, p = f;
     const double enough = 1e-8 * dot(r, r);
     double rr = dot(r, r);
