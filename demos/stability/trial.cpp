@@ -25,18 +25,6 @@ double energy_of(const World& world) {
   return sum;
 }
 
-template <class W>
-std::vector<StepReport> warnings_of(W& world) {
-  if constexpr (requires { world.take_warnings(); }) return world.take_warnings();
-  return {};
-}
-
-template <class B>
-bool sleeps(const B& body) {
-  if constexpr (requires { body.asleep(); }) return body.asleep();
-  return false;
-}
-
 }  // namespace
 
 const char* name_of(Outcome outcome) {
@@ -114,7 +102,7 @@ double rms_speed(const World& world) {
 double allowance(const Trial& trial, double share) { return share * kAllowed * (trial.thorough ? kThoroughFactor : 1); }
 
 bool asleep(const World& world) {
-  return std::all_of(world.bodies().begin(), world.bodies().end(), [](const auto& body) { return sleeps(*body); });
+  return std::all_of(world.bodies().begin(), world.bodies().end(), [](const auto& body) { return body->asleep(); });
 }
 
 Watch::Watch(World& world, Row& row, double reach, double allowed)
@@ -180,7 +168,7 @@ bool Watch::run(double until) {
     if (before) before();
     const StepReport report = world_.update(std::min(frame, until - world_.time()));
     row_.simulated = world_.time();
-    for (const StepReport& warning : warnings_of(world_)) listen(warning);
+    for (const StepReport& warning : world_.take_warnings()) listen(warning);
     if (!report.good()) {
       row_.outcome = Outcome::Broke;
       row_.failed_at = report.time;

@@ -213,6 +213,20 @@ void ImplicitSolver<S>::settle(Points<S>& v) const {
   }
 }
 
+template <class S>
+void ImplicitSolver<S>::bear(Points<S>& a) const {
+  for (const Contact& contact : contacts_) {
+    if (contact.touch == Touch::Free) continue;
+    Vec value = row(a, contact.point);
+    const S pressing = -value.dot(contact.normal);
+    if (!(pressing > 0)) continue;
+    value += pressing * contact.normal;
+    const S along = value.norm();
+    if (along > 0) value *= std::max(S(0), 1 - contact.friction * pressing / along);
+    set_row<S>(a, contact.point, value);
+  }
+}
+
 // product_ = (M + h²K + hD) direction_, on what is free.
 template <class S>
 void ImplicitSolver<S>::multiply(const Step& step, bool safe) {

@@ -42,6 +42,9 @@ class ImplicitSolver {
   /// Makes v of the points that the last solve held go with what holds them.
   void settle(Points<S>& v) const;
 
+  /// Takes from accelerations at rest what the planes of the last solve bear.
+  void bear(Points<S>& a) const;
+
   /// Forgets what it knows of the last step's matrix.
   void restart() { factored_ = false; }
 

@@ -94,6 +94,9 @@ class Integrator {
                     double shortest);
   Index adapted_steps() const { return adapted_steps_; }  ///< accepted by the last `adapt`
 
+  /// Takes from accelerations at rest what surfaces bear that an implicit step has found.
+  void bear(Points<S>& a) const { solver_.bear(a); }
+
   /// Since construction; kept by restart.
   const Work& work() const { return work_; }
   /// Adds evaluations that somebody else made for it.

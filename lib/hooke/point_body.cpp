@@ -582,6 +582,7 @@ double PointBody<S>::unbalanced(const Points<S>& x, Points<S>& left) {
   const Points<S> still = Points<S>::Zero(size(), 3);
   left.resize(size(), 3);
   still_acceleration(x, still, tick_.end, left);
+  integrator_.bear(left);
   settle(left);  // as it takes from velocities what surfaces stop, so it does from accelerations
   return double((points_.mass * left.square().rowwise().sum().sqrt()).sum());
 }
@@ -635,7 +636,8 @@ void PointBody<S>::begin_energy_watch() {
   if (energy_watch_.knows()) return;
   // Positions err by their rounding: so do heights, and springs by its square.
   const double off = double(std::numeric_limits<S>::epsilon()) * double(points_.position.abs().maxCoeff());
-  const double noise = rate_bounds().omega_squared * off * off + tick_.gravity.norm() * off;
+  const double omega = 2 / stable_step(velocity_verlet());  // of all forces, whatever moves it
+  const double noise = omega * omega * off * off + tick_.gravity.norm() * off;
   energy_watch_.start(total_energy(), energy(tick_.gravity).kinetic, 64 * total_mass() * noise);
 }
 

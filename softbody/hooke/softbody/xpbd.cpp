@@ -151,6 +151,7 @@ class XpbdBody final : public PointBody<S> {
     const bool touching = this->collides();
     if (touching || this->prescribes()) from_ = points_.position;
     begin(t, S(h));
+    planes_.clear(), contacts_.clear();
     if (touching) find_planes(t, S(h));
     prepare_gains(h);
     push_by_carried();
@@ -169,6 +170,30 @@ class XpbdBody final : public PointBody<S> {
     }
     if (t + 1.5 * h > tick_.end) judge(h);
     return {};
+  }
+  void still_acceleration(const Points<S>& x, const Points<S>& still, double t, Points<S>& a) override {
+    Base::still_acceleration(x, still, t, a);
+    if (!field_) return;
+    still_force_.setZero(x.rows(), 3);
+    if (&x == &points_.position)
+      field_->add_fine_force(x, low_, still, t, still_force_);
+    else
+      field_->add_force(x, still, t, still_force_);
+    a += still_force_.colwise() * points_.inverse_mass;
+  }
+  // What planes bear that the sweeps have met.
+  void settle(Points<S>& v) override {
+    Base::settle(v);
+    for (std::size_t i = 0; i < planes_.size(); ++i) {
+      const ContactPlane<S>& plane = planes_[i];
+      Vec value = v.row(plane.point).matrix().transpose();
+      const S pressing = -plane.normal.dot(value);
+      if (!(contacts_[i].pushed > 0 && pressing > 0)) continue;
+      value += pressing * plane.normal;
+      const S along = value.norm();
+      if (along > 0) value *= std::max(S(0), 1 - plane.friction * pressing / along);
+      v.row(plane.point) = value.transpose().array();
+    }
   }
 
  private:
@@ -201,7 +226,7 @@ class XpbdBody final : public PointBody<S> {
   std::vector<Record<S>> start_, way_;
   Memory memory_, before_;
   Points<S> low_, before_low_;  // what positions are rounded by
-  Points<S> from_, acceleration_, pin_x_, pin_v_;
+  Points<S> from_, acceleration_, still_force_, pin_x_, pin_v_;
   bool moving_pins_ = false;
   std::vector<ContactPlane<S>> planes_;
   std::vector<Contact<S>> contacts_;
