@@ -130,10 +130,6 @@ class PointBody : public Body, protected Dynamics<S> {
   virtual bool loses_energy() const;
 
   void check(Index point) const;
-  /// As Contacts::planes, of this tick's colliders; only after collides().
-  void planes(double t0, const Points<S>& x, double t1, S reach, std::vector<ContactPlane<S>>& out) {
-    contacts_.planes(t0, x, t1, reach, points_.inverse_mass, out);
-  }
   /// True where fields or pushes add to gravity in this tick.
   bool other_forces() const { return !fields_.empty() || pushing_; }
   Points<double> world(const Points<S>& p) const;
