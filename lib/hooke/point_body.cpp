@@ -660,8 +660,10 @@ StepReport PointBody<S>::watch_energy(double kinetic) {
   points_.velocity.square().rowwise().sum().maxCoeff(&report.point);
   report.advice = std::to_string(energy_watch_.gain(total)) + " J since it was last given any, " +
                   std::to_string(kinetic) + " J are in its motion, most at this point; " + step_advice();
-  // Of methods that no step makes stable without damping nobody expects anything else.
-  if (finding == EnergyWatch::Finding::Grows || settings_.method->stability_limit == 0) {
+  // Of methods that no step makes stable without damping nobody expects anything else; those that are stable at any
+  // step lose again what they gain.
+  const double limit = settings_.method->stability_limit;
+  if (finding == EnergyWatch::Finding::Grows || limit == 0 || !std::isfinite(limit)) {
     warn(std::move(report), warned_of_energy_);
     return {};
   }

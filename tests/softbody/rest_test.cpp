@@ -1,0 +1,207 @@
+// At rest means at rest: bodies fall, settle, sleep with the state kept to the bit, and wake.
+#include <hooke/softbody/lattice.hpp>
+#include <hooke/softbody/soft_body.hpp>
+#include <hooke/softbody/xpbd.hpp>
+#include <hooke/world.hpp>
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+namespace hooke::softbody {
+namespace {
+
+double rms_speed(const Body& body) { return std::sqrt(body.velocities().square().rowwise().sum().mean()); }
+
+double residual(Body& body, const Vec3& gravity) {
+  if (auto* single = dynamic_cast<PointBody<float>*>(&body)) return single->residual_force(gravity);
+  return dynamic_cast<PointBody<double>&>(body).residual_force(gravity);
+}
+
+Collider floor() {
+  Collider floor;
+  floor.name = "floor";
+  floor.shapes = {HalfSpace{}};
+  floor.friction = 0.5;
+  return floor;
+}
+
+// A cube of 10³ points, 0.2 m, 1 kg, all springs alike.
+SoftBodySettings cube(double stiffness, Precision precision) {
+  FixedLatticeMaterial material;
+  material.mass = 1;
+  material.stiffness = stiffness;
+  SoftBodySettings settings = settings_of(lattice_from_box({0.2, 0.2, 0.2}, {10, 10, 10}, material));
+  settings.name = "cube";
+  settings.precision = precision;
+  settings.origin = {0, 0.2, 0};
+  settings.origin.y() = 0.1 - settings.positions.col(1).minCoeff();  // its lowest points are 0.1 m above the floor
+  return settings;
+}
+
+struct Case {
+  double stiffness;
+  Precision precision;
+  double within;
+};
+
+class CubeAtRest : public ::testing::TestWithParam<Case> {};
+
+TEST_P(CubeAtRest, SettlesSleepsAndWakes) {
+  World world;
+  world.add_collider(floor());
+  Body& body = world.add(make_soft_body(cube(GetParam().stiffness, GetParam().precision)));
+  for (int frame = 0; frame < 60 * GetParam().within && !body.asleep(); ++frame)
+    ASSERT_TRUE(world.update(1.0 / 60).good());
+  ASSERT_TRUE(body.asleep()) << rms_speed(body) << " m/s";
+  EXPECT_TRUE((body.velocities() == 0).all());
+  const double weight = body.total_mass() * 9.81;
+  EXPECT_LT(residual(body, world.gravity()), 0.01 * weight);
+
+  // Ten minutes change nothing.
+  const Points<double> asleep = body.positions();
+  ASSERT_TRUE(world.update(600).good());
+  EXPECT_TRUE(body.asleep());
+  EXPECT_TRUE((body.positions() == asleep).all());
+
+  world.set_gravity({0, -9.81 * 1.01, 0});
+  ASSERT_TRUE(world.update(1.0 / 60).good());
+  EXPECT_FALSE(body.asleep());
+  EXPECT_FALSE((body.positions() == asleep).all());
+}
+
+INSTANTIATE_TEST_SUITE_P(Stiffness, CubeAtRest,
+                         ::testing::Values(Case{2000, Precision::Float, 3}, Case{2000, Precision::Double, 3},
+                                           Case{50, Precision::Float, 5}, Case{50, Precision::Double, 5}),
+                         [](const auto& which) {
+                           return std::to_string(int(which.param.stiffness)) +
+                                  std::string(which.param.precision == Precision::Float ? "Float" : "Double");
+                         });
+
+// What wakes a small cube that sleeps on the floor.
+class Sleeper : public ::testing::Test {
+ protected:
+  Sleeper() {
+    world_.add_collider(floor());
+    Collider ball;
+    ball.name = "ball";
+    ball.shapes = {Sphere{{0, 2, 0}, 0.1}};
+    ball.motion = [this](double, std::span<Shape> shapes) { shapes[0] = Sphere{place_, 0.1}; };
+    world_.add_collider(ball);
+    FixedLatticeMaterial material;
+    material.mass = 1;
+    material.stiffness = 2000;
+    SoftBodySettings settings = settings_of(lattice_from_box({0.1, 0.1, 0.1}, {4, 4, 4}, material));
+    settings.origin.y() = 0.01 - settings.positions.col(1).minCoeff();
+    body_ = &world_.add(make_soft_body(settings));
+    for (int frame = 0; frame < 300 && !body_->asleep(); ++frame) EXPECT_TRUE(world_.update(1.0 / 60).good());
+    EXPECT_TRUE(body_->asleep());
+  }
+  bool awake_after_a_frame() {
+    EXPECT_TRUE(world_.update(1.0 / 60).good());
+    return !body_->asleep();
+  }
+  World world_;
+  Body* body_ = nullptr;
+  Vec3 place_{0, 2, 0};
+};
+
+TEST_F(Sleeper, SleepsOnWhereNothingComesNear) {
+  EXPECT_FALSE(awake_after_a_frame());
+  place_ = {0, 1, 0};
+  EXPECT_FALSE(awake_after_a_frame());
+}
+
+TEST_F(Sleeper, WakesFromATouch) {
+  place_ = {0, 0.19, 0};
+  EXPECT_TRUE(awake_after_a_frame());
+}
+
+TEST_F(Sleeper, WakesFromAForce) {
+  body_->add_force(0, {0.1, 0, 0});
+  EXPECT_TRUE(awake_after_a_frame());
+}
+
+TEST_F(Sleeper, WakesFromAnEdit) {
+  body_->set_velocity(0, {0, 0.1, 0});
+  EXPECT_TRUE(awake_after_a_frame());
+}
+
+TEST_F(Sleeper, WakesFromAPinThatIsMoved) {
+  body_->pin(63);
+  for (int frame = 0; frame < 300 && !body_->asleep(); ++frame) ASSERT_TRUE(world_.update(1.0 / 60).good());
+  ASSERT_TRUE(body_->asleep());
+  body_->move_pin(63, body_->positions().row(63).matrix().transpose() + Vec3(0, 0.01, 0));
+  EXPECT_TRUE(awake_after_a_frame());
+}
+
+TEST_F(Sleeper, WakesFromAChangedSetting) {
+  world_.set_damping(0.1);
+  EXPECT_FALSE(body_->asleep());
+}
+
+TEST_F(Sleeper, WakesFromANewSolid) {
+  world_.add_collider(floor());
+  EXPECT_FALSE(body_->asleep());
+}
+
+// Without anything that takes energy nothing comes to rest, however slow it is.
+TEST(Rest, IsNotForWhatLosesNoEnergy) {
+  SoftBodySettings settings;
+  settings.positions = Points<double>::Zero(2, 3);
+  settings.positions(1, 1) = -1;
+  settings.masses = Values<double>::Ones(2);
+  settings.pins = {0};
+  auto network = std::make_shared<SpringNetwork>();
+  network->springs.push_back({0, 1, 1000, 0, 1 - 9.81 / 1000 + 1e-7});
+  settings.network = network;
+  World world;
+  Body& body = world.add(make_soft_body(settings));
+  ASSERT_TRUE(world.update(5).good());
+  EXPECT_LT(rms_speed(body), 1e-4);
+  EXPECT_FALSE(body.asleep());
+}
+
+// A block on a slope that friction holds does not creep.
+TEST(Rest, HoldsOnASlopeUnderEverySolver) {
+  for (const Method* method : {&velocity_verlet(), &xpbd(), &implicit_euler()}) {
+    SCOPED_TRACE(method->name);
+    FixedLatticeMaterial material;
+    material.mass = 1;
+    material.stiffness = 2000;
+    SoftBodySettings settings = settings_of(lattice_from_box({0.1, 0.1, 0.1}, {4, 4, 4}, material));
+    settings.origin.y() = 0.001 - settings.positions.col(1).minCoeff();
+    settings.motion.method = method;
+    World world;
+    world.set_gravity({9.81 * std::sin(0.4), -9.81 * std::cos(0.4), 0});  // tan 0.4 = 0.42, friction 0.5
+    world.add_collider(floor());
+    Body& body = world.add(make_soft_body(settings));
+    ASSERT_TRUE(world.update(5).good());
+    const Vec3 place = body.displacement();
+    ASSERT_TRUE(world.update(10).good());
+    EXPECT_LT((body.displacement() - place).norm(), 1e-6);
+    EXPECT_TRUE(body.asleep()) << rms_speed(body);
+  }
+}
+
+// Float keeps increments far below its places' rounding, whichever way a body is moved.
+TEST(Rest, DoesNotSwallowTinySteps) {
+  SoftBodySettings settings;
+  settings.positions = Points<double>::Constant(1, 3, 100);
+  settings.velocities = Points<double>::Constant(1, 3, 1e-3);
+  settings.masses = Values<double>::Ones(1);
+  settings.motion.dt = 1e-5;
+  settings.precision = Precision::Float;
+  for (const Method* method : {&velocity_verlet(), &verlet(), &semi_implicit_euler(), &rk4(), &xpbd()}) {
+    SCOPED_TRACE(method->name);
+    settings.motion.method = method;
+    World world;
+    world.enable_gravity(false);
+    Body& body = world.add(make_soft_body(settings));
+    ASSERT_TRUE(world.update(1).good());
+    EXPECT_NEAR(body.displacement().x(), 1e-3, 8e-6);  // a float's step at 100 m
+  }
+}
+
+}  // namespace
+}  // namespace hooke::softbody
