@@ -87,7 +87,12 @@ void Shot::add_body(const scene::SceneBody& body) {
   Drawn drawn;
   drawn.material.color = body.color.value_or(kClothColor);
   drawn.material.inside_color = body.inside_color.value_or(kInsideColor);
-  if (!body.triangles.empty()) {  // else sticks, made anew in every picture
+  if (body.look == scene::BodyLook::Jelly) {
+    drawn.mesh.triangles = body.triangles;
+    drawn.material = render::jelly();
+    if (body.color) drawn.material.color = *body.color;
+    drawn.subdivisions = body.body->size() <= 20000 ? 2 : 1;
+  } else if (!body.triangles.empty()) {  // else sticks, made anew in every picture
     drawn.mesh.triangles = body.triangles;
     drawn.material.kind = render::Material::Kind::Cloth;
     drawn.material.sheen = 0.25 * drawn.material.color + Vec3::Constant(0.09);

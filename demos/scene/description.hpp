@@ -16,7 +16,7 @@
 
 namespace hooke::scene {
 
-/// Points by index or as an edge of a grid ("top", "bottom-left", …).
+/// Points by index or as an edge of a grid ("top", "bottom-left", …) or a face, edge or corner of a lattice.
 using PointChoice = std::variant<Index, std::string>;
 
 struct PinDrive {
@@ -39,6 +39,11 @@ struct Grid {
 struct MeshFile {
   std::filesystem::path file;
 };
+struct LatticeBox {
+  Vec3 size{1, 1, 1};
+  std::array<int, 3> points{2, 2, 2};
+  Mat3 turn = Mat3::Identity();  ///< "rotation"
+};
 struct CapeCut {
   std::string human;  ///< name of a human collider
   double width = 0.9, height = 1.2;
@@ -51,7 +56,9 @@ struct FixedMaterial {
   double structural = 0, shear = 0, bend = 0;  ///< "stiffness" of each spring [N/m]
   double damping = 0;                          ///< of each spring [N·s/m]
 };
-using Material = std::variant<softbody::ClothMaterial, FixedMaterial>;
+/// The last two are for lattices.
+using Material =
+    std::variant<softbody::ClothMaterial, FixedMaterial, softbody::LatticeMaterial, softbody::FixedLatticeMaterial>;
 
 struct Solver {
   double error = 0;  ///< wanted, as a share of the body's size: the chooser picks all below; 0: they are given
@@ -62,11 +69,14 @@ struct Solver {
   softbody::Precision precision = softbody::Precision::Automatic;  // particles: float
 };
 
+/// What a soft body's surface is drawn as.
+enum class BodyLook { Cloth, Jelly };
+
 struct SoftBody {
   std::string name;
   std::string path;  ///< in the file, for messages: bodies[0]
   Vec3 origin{0, 0, 0};
-  std::variant<RawPoints, Grid, MeshFile, CapeCut> form;
+  std::variant<RawPoints, Grid, MeshFile, CapeCut, LatticeBox> form;
   Material material;
   std::vector<PointChoice> pin;
   std::vector<PinDrive> pin_motion;
@@ -74,6 +84,7 @@ struct SoftBody {
   double linear_drag = 0, quadratic_drag = 0;
   double thickness = 0;
   std::optional<Vec3> color, inside_color;
+  BodyLook look = BodyLook::Cloth;  ///< lattices: jelly where the file does not say
   Solver solver;
 };
 
