@@ -13,4 +13,7 @@ namespace hooke::render {
 /// cut. The font holds ASCII 32 to 126; any other character shows as '?'. No lines, no strip.
 void draw_caption(Image& image, const std::vector<std::string>& lines);
 
+/// Draws one line of light text, `dot` [pixels] the eighth of its height; (x, y) is its top left corner.
+void draw_text(Image& image, const std::string& line, double x, double y, double dot);
+
 }  // namespace hooke::render

@@ -225,6 +225,7 @@ class Builder {
     } else if (const auto* box = std::get_if<LatticeBox>(&description.form)) {
       settings = told_at(d_, description.path + ".lattice",
                          [&] { return softbody::settings_of(lattice_of(*box, description.material)); });
+      settings.positions.rowwise() += box->center.transpose().array();
       layout = {box->points[0], box->points[1], box->points[2], true};
     } else {
       const auto& cut = std::get<CapeCut>(description.form);

@@ -42,6 +42,7 @@ struct MeshFile {
 struct LatticeBox {
   Vec3 size{1, 1, 1};
   std::array<int, 3> points{2, 2, 2};
+  Vec3 center{0, 0, 0};          ///< of the box, relative to the body's origin [m]
   Mat3 turn = Mat3::Identity();  ///< "rotation"
 };
 struct CapeCut {
@@ -126,8 +127,9 @@ struct ColliderDescription {
 
 struct CameraDescription {
   Vec3 eye{0, 1.3, 5}, target{0, 0.9, 0};
-  double fov = 30;      ///< [degrees]
-  bool follow = false;  ///< eye and target are relative to where the first human walks
+  double fov = 30;       ///< [degrees]
+  Vec3 origin{0, 0, 0};  ///< in the world [m]; everything is drawn relative to it, and so are eye and target
+  bool follow = false;   ///< eye and target are relative to where the first human walks
 };
 
 struct SceneDescription {

@@ -146,6 +146,7 @@ LatticeBox read_lattice(const Object& lattice) {
       points.fail("must make at most " + std::to_string(kMostPoints) + " points");
     count *= form.points[k];
   }
+  form.center = lattice.vec3("center", form.center);
   if (const auto rotation = lattice.find("rotation")) form.turn = read_rotation(Object(*rotation, "rotation"));
   return form;
 }
@@ -438,6 +439,7 @@ CameraDescription read_camera(const Object& object) {
   CameraDescription camera;
   camera.eye = object["eye"].vec3();
   camera.target = object["target"].vec3();
+  camera.origin = object.vec3("origin", camera.origin);
   camera.fov = object.number("fov", camera.fov, Range::between(1, 120, "from 1 to 120"), "degrees");
   if (object.has("follow")) camera.follow = object["follow"].truth();
   const Vec3 sight = camera.target - camera.eye;

@@ -113,7 +113,7 @@ const KeyTable& key_table() {
                 "wind", "drag", "thickness", "color",  "inside_color", "look",     "solver"}},
       {"spring", {"points", "stiffness", "damping", "rest_length"}},
       {"grid", {"size", "points", "right", "down"}},
-      {"lattice", {"size", "points", "rotation"}},
+      {"lattice", {"size", "points", "center", "rotation"}},
       {"cape", {"human", "size", "points"}},
       {"cloth_material", {"density", "stretch", "shear", "bend", "damping_ratio"}},
       {"damping_ratio", {"stretch", "shear", "bend"}},
@@ -163,7 +163,9 @@ const KeyTable& key_table() {
       {"human",
        {"type", "name", "motion", "height", "from", "until", "hold", "blend_in", "settle", "filter_hz", "friction",
         "restitution", "color"}},
-      {"camera", {"eye", "target", "fov", "follow"}},
+      {"panels", {"hooke", "title", "scene", "set", "columns", "figures", "energy_curve", "panels"}},
+      {"panel", {"title", "scene", "set", "may_diverge"}},
+      {"camera", {"eye", "target", "origin", "fov", "follow"}},
   };
   return table;
 }

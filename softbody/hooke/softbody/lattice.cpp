@@ -142,6 +142,7 @@ Lattice lattice_from_box(const Vec3& size, const Count& points, const LatticeMat
 
   const Box box(points);
   Lattice lattice;
+  lattice.points = points;
   lattice.positions = box.positions(size, turn);
   lattice.masses.resize(lattice.positions.rows());
   box.each([&](const Count& at) {
@@ -166,8 +167,8 @@ Lattice lattice_from_box(const Vec3& size, const Count& points, const LatticeMat
     return shared * (axes == 1 ? edge[along] : shear * volume * squares / (2 * product));
   });
   lattice.triangles = box.surface();
-  lattice.volume_stiffness = m.young / (3 * (1 - 2 * m.poisson_ratio)) - shear * 5 / 3;
-  if (m.poisson_ratio == 0.25) lattice.volume_stiffness = 0;
+  lattice.cell_stiffness = m.young / (3 * (1 - 2 * m.poisson_ratio)) - shear * 5 / 3;
+  if (m.poisson_ratio == 0.25) lattice.cell_stiffness = 0;
   return lattice;
 }
 
@@ -178,6 +179,7 @@ Lattice lattice_from_box(const Vec3& size, const Count& points, const FixedLatti
   require(m.damping_ratio >= 0, "damping_ratio", "not be negative", m.damping_ratio);
   const Box box(points);
   Lattice lattice;
+  lattice.points = points;
   lattice.positions = box.positions(size, turn);
   lattice.masses = Values<double>::Constant(lattice.positions.rows(), m.mass / double(lattice.positions.rows()));
   lattice.network = box.join(lattice.masses, m.damping_ratio, [&](const Count&, const Count&) { return m.stiffness; });

@@ -30,6 +30,7 @@ class VolumeField final : public ForceField<S> {
   /// κ/V₀ Σ w |∇V|², exact for the pressure's change, and the largest row of the rest.
   typename ForceField<S>::Rates rate_bounds(const Points<S>& x, const Points<S>& v,
                                             const Values<S>& inverse_mass) const override;
+  void describe(Blueprint& out) const override;
 
  private:
   double pressure(const Points<S>& x) const;  // [Pa], of compression
