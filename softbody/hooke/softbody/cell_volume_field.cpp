@@ -199,35 +199,41 @@ typename ForceField<S>::Rates CellVolumeField<S>::rate_bounds(const Points<S>& x
     }
   });
   const int nx = points_[0], ny = points_[1], nz = points_[2];
-  const auto gradient = [&](std::size_t cell, int corner) {
-    const auto& face = faces_[cell];
+  const auto gradient = [&](int cell, int corner) {
+    const auto& face = faces_[std::size_t(cell)];
     return Vec3((corner & 1 ? 1 : -1) * face.col(0) + (corner & 2 ? 1 : -1) * face.col(1) +
                 (corner & 4 ? 1 : -1) * face.col(2));
   };
   sums_.setZero(x.rows());
-  double most = 0, turning = 0;
+  rows_.assign(faces_.size(), 0);
+  double turning = 0;
   for (int z = 0; z + 1 < nz; ++z)
     for (int y = 0; y + 1 < ny; ++y)
       for (int i = 0; i + 1 < nx; ++i) {
-        const std::size_t cell = std::size_t((z * (ny - 1) + y) * (nx - 1) + i);
-        double with[27] = {};  // by neighbour
+        const int cell = (z * (ny - 1) + y) * (nx - 1) + i;
+        double with[27] = {};  // by neighbour; those before it have been there
         for (int corner = 0; corner < 8; ++corner) {
           const int px = i + (corner & 1), py = y + (corner >> 1 & 1), pz = z + (corner >> 2);
           const Index point = (Index(pz) * ny + py) * nx + px;
-          sums_[point] += faces_[cell](0, 3);
-          const double w = double(inverse_mass[point]);
-          const Vec3 g = w * gradient(cell, corner);
+          sums_[point] += faces_[std::size_t(cell)](0, 3);
+          const Vec3 g = double(inverse_mass[point]) * gradient(cell, corner);
           for (int other = 0; other < 8; ++other) {  // as which corner the neighbour has the point
             const int cx = px - (other & 1), cy = py - (other >> 1 & 1), cz = pz - (other >> 2);
             if (cx < 0 || cy < 0 || cz < 0 || cx + 1 >= nx || cy + 1 >= ny || cz + 1 >= nz) continue;
-            with[(cz - z + 1) * 9 + (cy - y + 1) * 3 + cx - i + 1] +=
-                g.dot(gradient(std::size_t((cz * (ny - 1) + cy) * (nx - 1) + cx), other));
+            const int neighbour = (cz * (ny - 1) + cy) * (nx - 1) + cx;
+            if (neighbour < cell) continue;
+            with[(cz - z + 1) * 9 + (cy - y + 1) * 3 + cx - i + 1] += g.dot(gradient(neighbour, other));
           }
         }
-        double row = 0;
-        for (const double each : with) row += std::abs(each);
-        most = std::max(most, row);
+        rows_[std::size_t(cell)] += std::abs(with[13]);
+        for (int k = 14; k < 27; ++k) {
+          if (with[k] == 0) continue;
+          const int neighbour = cell + ((k / 9 - 1) * (ny - 1) + k / 3 % 3 - 1) * (nx - 1) + k % 3 - 1;
+          rows_[std::size_t(cell)] += std::abs(with[k]);
+          rows_[std::size_t(neighbour)] += std::abs(with[k]);
+        }
       }
+  const double most = *std::max_element(rows_.begin(), rows_.end());
   for (Index i = 0; i < x.rows(); ++i) turning = std::max(turning, double(inverse_mass[i]) * sums_[i]);
   return {most + turning, 0};
 }

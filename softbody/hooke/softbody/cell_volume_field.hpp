@@ -13,7 +13,7 @@ namespace hooke::softbody {
 /// inside out, so that it is driven back: springs alone are as content in the mirror. The force is the exact
 /// gradient; it sums to zero over the points of a cell and changes neither momentum nor angular momentum.
 /// One volume a cell, from mean edges: a finer condition would lock (Flanagan and Belytschko 1981).
-/// Cost: about as much as the springs of the cell.
+/// Cost: 1.7 times that of the springs along edges and face diagonals.
 template <class S>
 class CellVolumeField final : public ForceField<S> {
  public:
@@ -47,7 +47,8 @@ class CellVolumeField final : public ForceField<S> {
   std::vector<S> start_;  // V₀ by cell
   // Scratch of rate_bounds; a field belongs to one body and is asked by one thread at a time.
   mutable std::vector<Eigen::Matrix<double, 3, 4>> faces_;
-  mutable Values<double> sums_;
+  mutable std::vector<double> rows_;  // by cell
+  mutable Values<double> sums_;       // by point
 };
 
 extern template class CellVolumeField<float>;
