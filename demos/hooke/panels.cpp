@@ -22,7 +22,7 @@ namespace {
 
 constexpr double kStrip = 0.24;       // share of a panel's height that its energy takes
 constexpr int kGap = 4;               // pixels between panels
-constexpr double kFlownApart = 10;    // a body that grew to so many times its size is no longer drawn anew
+constexpr double kFlownApart = 2.5;   // a body that grew to so many times its size is no longer drawn anew
 constexpr double kHeadroom = 1.15;    // of the energy's scale
 constexpr double kLeastScale = 1e-9;  // [J]
 
@@ -147,7 +147,7 @@ void draw_curve(render::Image& image, int x0, const std::vector<double>& heights
 
 // Total energy minus that of the start, up to `frame`; the whole height is ± scale.
 void draw_energy(render::Image& image, int x0, int y0, int width, int height, const PanelRun& panel, std::size_t frame,
-                 std::size_t frames, double scale) {
+                 std::size_t frames, double scale, double dot) {
   render::Image strip{width, height,
                       std::vector<std::uint8_t>(std::size_t(3) * std::size_t(width) * std::size_t(height))};
   for (int y = 0; y < height; ++y)
@@ -168,7 +168,6 @@ void draw_energy(render::Image& image, int x0, int y0, int width, int height, co
     if (!std::isfinite(energy) || std::abs(level) >= 3) break;
   }
   draw_curve(strip, 0, heights, std::max(1.5, height / 55.0), kCurve);
-  const double dot = std::max(1.0, height / 110.0);
   char text[60];
   std::snprintf(text, sizeof text, "total energy, up to +-%.2g J", scale);
   render::draw_text(strip, text, 6 * dot, 5 * dot, dot);
@@ -223,6 +222,8 @@ int panels(const RenderOptions& options) {
   for (PanelRun& each : runs) {
     each.shot = std::make_unique<Shot>(each.scene, each.snapshots, double(width) / picture);
   }
+  // Text as large as in a single picture, if a panel's width holds it.
+  const double text = std::clamp(width / 280.0, 1.0, std::max(1.0, 0.75 * options.height / 540.0));
   const auto compose = [&](std::size_t frame, int supersample) {
     render::Image image{
         options.width, options.height,
@@ -234,11 +235,12 @@ int panels(const RenderOptions& options) {
         each.stage->set_look(each.shot->look());
       }
       const std::size_t shown = std::min(frame, each.snapshots.size() - 1);
-      const render::Image drawn = each.shot->draw(*each.stage, shown, caption_of(panels, i, each, shown));
+      render::Image drawn = each.shot->draw(*each.stage, shown, {});
+      render::draw_caption(drawn, caption_of(panels, i, each, shown), text / std::max(1.0, picture / 540.0));
       const int x0 = int(i) % columns * (width + kGap), y0 = int(i) / columns * (height + kGap);
       for (int y = 0; y < picture; ++y)
         std::copy_n(drawn.at(0, y), std::size_t(3) * std::size_t(width), image.at(x0, y0 + y));
-      if (strip > 0) draw_energy(image, x0, y0 + picture, width, strip, each, frame, frames, scale);
+      if (strip > 0) draw_energy(image, x0, y0 + picture, width, strip, each, frame, frames, scale, text);
     }
     return image;
   };

@@ -121,12 +121,12 @@ void draw_text(Image& image, const std::string& line, double x, double y, double
     draw_glyph(image, line[i], x + (0.5 + kAdvance * double(i)) * dot, y + 0.5 * dot, dot);
 }
 
-void draw_caption(Image& image, const std::vector<std::string>& lines) {
+void draw_caption(Image& image, const std::vector<std::string>& lines, double scale) {
   std::size_t longest = 0;
   for (const std::string& line : lines) longest = std::max(longest, line.size());
   if (longest == 0 || image.width <= 0 || image.height <= 0) return;
 
-  const double dot = std::max(1.0, image.height / 540.0);
+  const double dot = scale * std::max(1.0, image.height / 540.0);
   const double advance = kAdvance * dot, leading = 11.5 * dot, pad = 7 * dot, edge = 12 * dot;
   const double height = leading * double(lines.size()) - 3.5 * dot + 2 * pad;
   const double room = image.width - 2 * edge;

@@ -243,6 +243,7 @@ class Builder {
     settings.motion.thickness = description.thickness;
     settings.motion.dt = description.solver.dt;
     settings.motion.tolerance = description.solver.tolerance;
+    settings.motion.compensated = description.solver.compensated;
     settings.motion.method = &method_of(description.solver.method);
     settings.wanted_error = description.solver.wanted_error;
     settings.precision = description.solver.precision;

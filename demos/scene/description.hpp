@@ -68,6 +68,7 @@ struct Solver {
   double tolerance = 1e-6;  ///< of adaptive methods with dt = 0 [m], as MotionSettings::tolerance
   double wanted_error = 0;  ///< of filtered-leapfrog [m], as SoftBodySettings::wanted_error; 0: none
   softbody::Precision precision = softbody::Precision::Automatic;  // particles: float
+  bool compensated = true;                                         ///< as MotionSettings
 };
 
 /// What a soft body's surface is drawn as.

@@ -248,6 +248,7 @@ Solver read_solver(const Object& object) {
     if (solver.dt > 0) error->fail("excludes dt");
     solver.wanted_error = error->number(Range::positive(), "m");
   }
+  if (object.has("compensated")) solver.compensated = object["compensated"].truth();
   if (const auto precision = object.find("precision"))
     solver.precision = softbody::precision_named(precision->choice({"float", "double", "double-float"}));
   return solver;

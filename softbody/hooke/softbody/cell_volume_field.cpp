@@ -126,10 +126,27 @@ std::vector<double> CellVolumeField<S>::volumes(const Points<S>& x) const {
 
 template <class S>
 void CellVolumeField<S>::add_force(const Points<S>& x, const Points<S>&, double, Points<S>& f) const {
+  add_forces(x, nullptr, f);
+}
+
+template <class S>
+void CellVolumeField<S>::add_fine_force(const Points<S>& x, const Points<S>& low, const Points<S>&, double,
+                                        Points<S>& f) const {
+  add_forces(x, &low, f);
+}
+
+template <class S>
+void CellVolumeField<S>::add_forces(const Points<S>& x, const Points<S>* low, Points<S>& f) const {
   each_row([&](const Rows& rows, int count, Index cell) {
     Threes<S> edges, faces;
     S pressure[kWide];
     take_edges(x, rows, count, edges);
+    if (low) {
+      take_edges(*low, rows, count, faces);
+      for (int v = 0; v < 3; ++v)
+        for (int k = 0; k < 3; ++k)
+          for (int i = 0; i < count; ++i) edges.at[v][k][i] += faces.at[v][k][i];
+    }
     cross(edges, edges, count, faces);
     dot(edges, faces, 0, count, pressure);
     const S* start = start_.data() + cell;

@@ -27,7 +27,10 @@ class CellVolumeField final : public ForceField<S> {
   std::vector<double> volumes(const Points<S>& x) const;
 
   bool uses_velocity() const override { return false; }
+  bool passive() const override { return true; }
   void add_force(const Points<S>& x, const Points<S>& v, double t, Points<S>& f) const override;
+  void add_fine_force(const Points<S>& x, const Points<S>& low, const Points<S>& v, double t,
+                      Points<S>& f) const override;
   /// The change of pressure, κ/V₀ ∇V ∇Vᵀ, is never negative; `safe` leaves out the turning of the faces.
   void add_stiffness_times(const Points<S>& x, const Points<S>& d, bool safe, Points<S>& out) const override;
   double potential_energy(const Points<S>& x) const override;
@@ -41,6 +44,7 @@ class CellVolumeField final : public ForceField<S> {
   // four rows of points beside them.
   template <class Work>
   void each_row(const Work& work) const;
+  void add_forces(const Points<S>& x, const Points<S>* low, Points<S>& f) const;
 
   S stiffness_;
   std::array<int, 3> points_;

@@ -91,7 +91,8 @@ class Box {
     return std::make_shared<const SpringNetwork>(std::move(network));
   }
 
-  // The six faces. Their diagonals alternate, so that no direction is favoured.
+  // The six faces. Their diagonals go one way, so that almost all points have six neighbours: alternating ones
+  // would show as bumps wherever the surface is subdivided.
   std::vector<Triangle> surface() const {
     std::vector<Triangle> triangles;
     for (std::size_t normal = 0; normal < 3; ++normal) {
@@ -108,10 +109,8 @@ class Box {
             };
             int ring[4] = {corner(0, 0), corner(1, 0), corner(1, 1), corner(0, 1)};
             if (!far) std::swap(ring[1], ring[3]);
-            const int turn = (at[u] + at[v]) % 2;
-            const auto r = [&](int i) { return ring[(i + turn) % 4]; };
-            triangles.push_back({r(0), r(1), r(2)});
-            triangles.push_back({r(0), r(2), r(3)});
+            triangles.push_back({ring[0], ring[1], ring[2]});
+            triangles.push_back({ring[0], ring[2], ring[3]});
           }
       }
     }
