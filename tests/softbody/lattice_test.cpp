@@ -359,6 +359,23 @@ TEST(CellVolume, ACellThatIsInsideOutComesBack) {
   }
 }
 
+// Far from the origin, where float drops most of a cell's edges.
+TEST(CellVolume, FineForceUsesWhatRoundingHasDropped) {
+  const Lattice lattice = lattice_from_box({0.1, 0.1, 0.1}, {4, 4, 4}, LatticeMaterial{});
+  Random random;
+  SCOPED_TRACE(random.trace());
+  const Points<double> x = crumpled(lattice, 0.005, random) + 100, none = Points<double>::Zero(x.rows(), 3);
+  const Points<float> high = x.cast<float>(), low = (x - high.cast<double>()).cast<float>(), still = none.cast<float>();
+  Points<double> exact = none;
+  Points<float> coarse = still, fine = still;
+  Cells::of<double>(1e4, lattice).add_force(x, none, 0, exact);
+  const auto field = Cells::of<float>(1e4, lattice);
+  field.add_force(high, still, 0, coarse);
+  field.add_fine_force(high, low, still, 0, fine);
+  EXPECT_LT(largest(fine.cast<double>() - exact), 1e-5 * largest(exact));
+  EXPECT_GT(largest(coarse.cast<double>() - exact), 1e-4 * largest(exact));
+}
+
 TEST(CellVolume, RefusesWhatHasNoCells) {
   const Lattice lattice = lattice_from_box({0.1, 0.1, 0.1}, {3, 3, 3}, LatticeMaterial{});
   const auto told = [&](double stiffness, const Count& points, const Points<double>& start) -> std::string {
