@@ -31,6 +31,8 @@ struct RenderOptions {
   std::filesystem::path poster;    ///< beside a film: its poster as a PNG; empty: none
 };
 int render(const RenderOptions& options);
+/// Several scenes side by side; run.scene is a file of panels, of `run` only `end` counts besides.
+int panels(const RenderOptions& options);
 
 int validate(const std::string& scene);
 

@@ -24,10 +24,10 @@ int tell(int code, std::string text) {
 
 struct Arguments {
   SimulateOptions simulate;
-  RenderOptions render;
+  RenderOptions render, panels;
   ReportOptions report;
   StabilityOptions stability;
-  std::string validate_scene, size;
+  std::string validate_scene, size;  // of pictures
   bool list = false, no_estimate = false;
 };
 
@@ -40,9 +40,17 @@ void add_run_options(CLI::App& command, RunOptions& run) {
   command.add_option("--threads", run.threads, "Threads that move bodies; one body is moved by one thread");
 }
 
+void add_picture_options(CLI::App& command, RenderOptions& options, std::string& size) {
+  command.add_option("--out", options.out, "FILE.mp4, FILE.png or a folder for one PNG a frame")->required();
+  command.add_option("--size", size, "WIDTHxHEIGHT [pixels], 1280x720 if not given");
+  command.add_option("--frame-at", options.frame_at, "Moment of a PNG [s]");
+  command.add_option("--poster", options.poster, "With a film: also its poster frame as this PNG, supersampled twice");
+  command.add_option("--supersample", options.supersample, "1 to 4: draws that many times larger and averages");
+}
+
 void check(const CLI::App& command, const RunOptions& run) {
   for (const auto& [name, value] : {std::pair{"--dt", run.dt}, {"--end", run.end}})
-    if (command.count(name) && !(value > 0 && std::isfinite(value)))
+    if (command.get_option_no_throw(name) && command.count(name) && !(value > 0 && std::isfinite(value)))
       throw Error(std::string(name) + " must be positive [s], got " + std::to_string(value));
   if (run.end > 1e6) throw Error("--end must be at most 1e6 s, got " + std::to_string(run.end));
 }
@@ -89,14 +97,15 @@ int dispatch(int argc, char** argv) {
 
   CLI::App* render_command = app.add_subcommand("render", "Simulate a scene and draw it as a film or a picture");
   add_run_options(*render_command, a.render.run);
-  render_command->add_option("--out", a.render.out, "FILE.mp4, FILE.png or a folder for one PNG a frame")->required();
-  render_command->add_option("--size", a.size, "WIDTHxHEIGHT [pixels], 1280x720 if not given");
-  render_command->add_option("--frame-at", a.render.frame_at, "Moment of a PNG [s]");
-  render_command->add_option("--poster", a.render.poster,
-                             "With a film: also its poster frame as this PNG, supersampled twice");
-  render_command->add_option("--supersample", a.render.supersample,
-                             "1 to 4: draws that many times larger and averages");
+  add_picture_options(*render_command, a.render, a.size);
   render_command->footer("Example: hooke render flag --out flag.png --frame-at 2.5 --size 1920x1080 --supersample 2");
+
+  CLI::App* panels_command =
+      app.add_subcommand("panels", "Simulate several scenes and draw them side by side with their measured figures");
+  panels_command->add_option("panels", a.panels.run.scene, "File of panels, or the name of one")->required();
+  panels_command->add_option("--end", a.panels.run.end, "Simulated time [s] instead of the scenes' duration");
+  add_picture_options(*panels_command, a.panels, a.size);
+  panels_command->footer("Example: hooke panels six-methods --out methods.mp4 --size 1920x1080");
 
   CLI::App* validate_command = app.add_subcommand("validate", "Check a scene; largest stable step of every method");
   validate_command->add_option("scene", a.validate_scene, "Scene file, or the name of a scene")->required();
@@ -148,18 +157,19 @@ int dispatch(int argc, char** argv) {
     a.simulate.estimate_error = !a.no_estimate;
     return simulate(a.simulate);
   }
-  if (render_command->parsed()) {
-    check(*render_command, a.render.run);
-    if (!a.size.empty()) read_size(a.size, a.render);
-    if (a.render.supersample < 1 || a.render.supersample > 4)
-      throw Error("--supersample must be from 1 to 4, got " + std::to_string(a.render.supersample));
-    return render(a.render);
+  for (const auto& [command, options] : {std::pair{render_command, &a.render}, {panels_command, &a.panels}}) {
+    if (!command->parsed()) continue;
+    check(*command, options->run);
+    if (!a.size.empty()) read_size(a.size, *options);
+    if (options->supersample < 1 || options->supersample > 4)
+      throw Error("--supersample must be from 1 to 4, got " + std::to_string(options->supersample));
+    return command == render_command ? render(*options) : panels(*options);
   }
   if (report_command->parsed()) return report(a.report);
   if (stability_command->parsed()) return stability(a.stability);
   if (validate_command->parsed()) return validate(a.validate_scene);
   if (list_command->parsed() || a.list) return list();
-  return tell(kBadInput, "a command is needed: simulate, render, validate, report, stability or list (hooke --help)");
+  return tell(kBadInput, "a command is needed: simulate, render, panels, validate, report, stability or list (hooke --help)");
 }
 
 }  // namespace

@@ -38,6 +38,9 @@ render::Material material_of(scene::Surface look, const std::optional<Vec3>& col
   return material;
 }
 
+// What is drawn at zero.
+Vec3 drawn_from(const scene::SceneDescription& scene) { return scene.camera ? scene.camera->origin : Vec3(0, 0, 0); }
+
 // Where all but the outermost `kStray` of them are.
 void cover_most(std::vector<float>& values, double& low, double& high) {
   const auto at = [&](double share) {
@@ -65,8 +68,13 @@ Vec3 followed(const human::Human& human, double t, double least_time, std::vecto
 
 Snapshot snapshot_of(const scene::Scene& scene, double simulate_ms) {
   Snapshot out{scene.shown_time(), simulate_ms, scene::worst_stretch(scene), {}, {}};
-  for (const scene::SceneBody& body : scene.bodies) out.points.push_back(body.body->positions().cast<float>());
-  for (const scene::SceneParticles& particles : scene.particles) out.particles.push_back(particles.view());
+  const Eigen::Array3d from = drawn_from(scene.description).array();
+  for (const scene::SceneBody& body : scene.bodies)
+    out.points.push_back((body.body->positions().rowwise() - from.transpose()).cast<float>());
+  for (const scene::SceneParticles& particles : scene.particles) {
+    out.particles.push_back(particles.view());
+    out.particles.back().positions.rowwise() -= from.cast<float>().transpose();
+  }
   return out;
 }
 
@@ -87,7 +95,12 @@ void Shot::add_body(const scene::SceneBody& body) {
   Drawn drawn;
   drawn.material.color = body.color.value_or(kClothColor);
   drawn.material.inside_color = body.inside_color.value_or(kInsideColor);
-  if (!body.triangles.empty()) {  // else sticks, made anew in every picture
+  if (body.look == scene::BodyLook::Jelly) {
+    drawn.mesh.triangles = body.triangles;
+    drawn.material = render::jelly();
+    if (body.color) drawn.material.color = *body.color;
+    drawn.subdivisions = body.body->size() <= 20000 ? 2 : 1;
+  } else if (!body.triangles.empty()) {  // else sticks, made anew in every picture
     drawn.mesh.triangles = body.triangles;
     drawn.material.kind = render::Material::Kind::Cloth;
     drawn.material.sheen = 0.25 * drawn.material.color + Vec3::Constant(0.09);
@@ -115,7 +128,9 @@ void Shot::add_colliders() {
     const auto* set = std::get_if<LevelSet>(&colliders[i].shapes[0]);
     if (says.look == scene::Surface::Water && set && !colliders[i].motion) {
       colliders_.pop_back();
-      pools_.emplace_back(*set);
+      LevelSet seen = *set;
+      seen.offset -= drawn_from(scene_.description);
+      pools_.emplace_back(seen);
       waters_.push_back(material_of(says.look, says.color, false));
       continue;
     }
@@ -130,6 +145,19 @@ std::vector<Shape> Shot::shapes_at(std::size_t collider, double shown_time) cons
   const Collider& solid = scene_.world.colliders()[collider];
   std::vector<Shape> shapes = solid.shapes;
   if (solid.motion) solid.motion(shown_time + scene_.description.preroll, shapes);
+  const Vec3 from = drawn_from(scene_.description);
+  for (Shape& shape : shapes) {
+    if (auto* half = std::get_if<HalfSpace>(&shape))
+      half->offset -= half->normal.dot(from);
+    else if (auto* sphere = std::get_if<Sphere>(&shape))
+      sphere->center -= from;
+    else if (auto* capsule = std::get_if<Capsule>(&shape))
+      capsule->a -= from, capsule->b -= from;
+    else if (auto* box = std::get_if<Box>(&shape))
+      box->center -= from;
+    else
+      std::get<LevelSet>(shape).offset -= from;
+  }
   return shapes;
 }
 
@@ -189,7 +217,7 @@ void Shot::find_path() {
   const human::Human& human = scene_.humans[0].human;
   std::vector<io::JointFrame> joints(human.joint_names().size());
   for (std::size_t i = 0; i < path_.size(); ++i) {
-    path_[i] = followed(human, snapshots_[i].time, human.start_time(), joints);
+    path_[i] = followed(human, snapshots_[i].time, human.start_time(), joints) - drawn_from(scene_.description);
     path_[i].y() = 0;
   }
 }
@@ -279,7 +307,10 @@ void Shot::place(std::size_t frame) {
     if (points.rows() <= kMostSticks)
       append_sticks(points, sticks, 0.004 * std::max(0.05, (upper_ - lower_).norm()), mesh);
   }
-  for (const scene::SceneHuman& human : scene_.humans) human.human.skin(snapshot.time, drawn_[next++].mesh.vertices);
+  for (const scene::SceneHuman& human : scene_.humans) {
+    human.human.skin(snapshot.time, drawn_[next].mesh.vertices);
+    drawn_[next++].mesh.vertices.rowwise() -= drawn_from(scene_.description).transpose().array();
+  }
   for (std::size_t i = 0; i < colliders_.size(); ++i) {
     TriangleMesh& mesh = drawn_[next++].mesh;
     mesh = meshes_[i];
@@ -291,21 +322,24 @@ void Shot::place(std::size_t frame) {
   for (Drawn& drawn : drawn_) drawn.mesh.vertices.col(1) += lift_;
 }
 
+std::string Shot::solver() const {
+  if (scene_.bodies.empty() && scene_.particles.empty()) return {};
+  const Body& first = scene_.bodies.empty() ? scene_.particles[0].body() : *scene_.bodies[0].body;
+  const MotionFacts facts = first.motion_facts();
+  char text[200];
+  std::snprintf(text, sizeof text, "%s, %s, step %.3g ms", facts.method.c_str(), facts.precision.c_str(),
+                1e3 * scene_.world.clock().tick() / double(std::max<Index>(1, facts.substeps)));
+  return text;
+}
+
 std::vector<std::string> Shot::caption(std::size_t frame) const {
   const scene::SceneDescription& d = scene_.description;
   std::vector<std::string> lines{d.title.empty() ? d.file : d.title};
   Index points = 0;
   for (const scene::SceneBody& body : scene_.bodies) points += body.body->size();
+  if (const std::string line = solver(); !line.empty())
+    lines.push_back(scene_.bodies.empty() ? line : std::to_string(points) + " points, " + line);
   char text[200];
-  if (!scene_.bodies.empty() || !scene_.particles.empty()) {
-    const Body& first = scene_.bodies.empty() ? scene_.particles[0].body() : *scene_.bodies[0].body;
-    const MotionFacts facts = first.motion_facts();
-    const std::string count = scene_.bodies.empty() ? "" : std::to_string(points) + " points, ";
-    std::snprintf(text, sizeof text, "%s%s, %s, step %.3g ms", count.c_str(), facts.method.c_str(),
-                  facts.precision.c_str(),
-                  1e3 * scene_.world.clock().tick() / double(std::max<Index>(1, facts.substeps)));
-    lines.emplace_back(text);
-  }
   Index alive = 0;
   for (const scene::ParticleView& view : snapshots_[frame].particles) alive += view.positions.rows();
   std::string line;
@@ -320,7 +354,9 @@ std::vector<std::string> Shot::caption(std::size_t frame) const {
   return lines;
 }
 
-render::Image Shot::draw(render::Stage& stage, std::size_t frame) {
+render::Image Shot::draw(render::Stage& stage, std::size_t frame) { return draw(stage, frame, caption(frame)); }
+
+render::Image Shot::draw(render::Stage& stage, std::size_t frame, const std::vector<std::string>& lines) {
   place(frame);
   std::vector<render::Model> models;
   for (const Drawn& drawn : drawn_) {
@@ -353,7 +389,7 @@ render::Image Shot::draw(render::Stage& stage, std::size_t frame) {
     particles_[i].append(models);
   }
   ++pictures_;
-  return stage.draw(models, particles, camera_at(frame), caption(frame));
+  return stage.draw(models, particles, camera_at(frame), lines);
 }
 
 std::string Shot::told() const {

@@ -34,6 +34,10 @@ class Shot {
   render::Look look() const;
   /// Draws one of the snapshots.
   render::Image draw(render::Stage& stage, std::size_t frame);
+  /// The same with other lines in its caption.
+  render::Image draw(render::Stage& stage, std::size_t frame, const std::vector<std::string>& lines);
+  /// How the first body is moved, a line; empty where nothing moves.
+  std::string solver() const;
   /// What making water's surfaces took, or nothing.
   std::string told() const;
 

@@ -12,6 +12,7 @@ namespace hooke::render {
 namespace {
 
 constexpr int kColumns = 5, kRows = 8;
+constexpr double kAdvance = 6.2;  // [dots] from one letter to the next
 
 // One glyph a row, ASCII 32 to 126; one byte a column from left to right, bit 0 on top.
 constexpr std::uint8_t kFont[95][kColumns] = {
@@ -115,13 +116,18 @@ void draw_glyph(Image& image, char character, double x, double y, double dot) {
 
 }  // namespace
 
-void draw_caption(Image& image, const std::vector<std::string>& lines) {
+void draw_text(Image& image, const std::string& line, double x, double y, double dot) {
+  for (std::size_t i = 0; i < line.size(); ++i)
+    draw_glyph(image, line[i], x + (0.5 + kAdvance * double(i)) * dot, y + 0.5 * dot, dot);
+}
+
+void draw_caption(Image& image, const std::vector<std::string>& lines, double scale) {
   std::size_t longest = 0;
   for (const std::string& line : lines) longest = std::max(longest, line.size());
   if (longest == 0 || image.width <= 0 || image.height <= 0) return;
 
-  const double dot = std::max(1.0, image.height / 540.0);
-  const double advance = 6.2 * dot, leading = 11.5 * dot, pad = 7 * dot, edge = 12 * dot;
+  const double dot = scale * std::max(1.0, image.height / 540.0);
+  const double advance = kAdvance * dot, leading = 11.5 * dot, pad = 7 * dot, edge = 12 * dot;
   const double height = leading * double(lines.size()) - 3.5 * dot + 2 * pad;
   const double room = image.width - 2 * edge;
   const auto columns = static_cast<std::size_t>(std::max(0.0, (room - 2 * pad) / advance));
@@ -129,9 +135,7 @@ void draw_caption(Image& image, const std::vector<std::string>& lines) {
   const double top = image.height - edge - height;
   draw_strip(image, edge, top, edge + 2 * pad + advance * double(longest) - dot, image.height - edge, 4 * dot);
   for (std::size_t row = 0; row < lines.size(); ++row)
-    for (std::size_t i = 0; i < std::min(columns, lines[row].size()); ++i)
-      draw_glyph(image, lines[row][i], edge + pad + 0.5 * dot + advance * double(i),
-                 top + pad + 0.5 * dot + leading * double(row), dot);
+    draw_text(image, lines[row].substr(0, columns), edge + pad, top + pad + leading * double(row), dot);
 }
 
 }  // namespace hooke::render

@@ -381,6 +381,109 @@ void main() {
   light = vec4(mix(result, white, 0.88 * foam), 1);
 })";
 
+// Seen from the key light: the way through all jelly [m], and times what a metre of it absorbs. Back faces add
+// their depth, front faces take theirs off.
+const char* const kTint = R"(
+uniform float metres;
+uniform vec3 absorbed;
+out vec4 tint;
+void main() {
+  float z = (gl_FrontFacing ? -1.0 : 1.0) * gl_FragCoord.z * metres;
+  tint = vec4(absorbed * z, z);
+})";
+
+// Light bends where it enters, passes to the far side, and leaves it or is mirrored there. On the way it is
+// absorbed, and a little of what comes from the lights is scattered into it, which makes the jelly glow.
+const char* const kJelly = R"(
+centroid in vec3 place;
+centroid in vec3 facing;
+centroid in vec2 cloth_place;
+centroid in float side;
+centroid in float hem;
+uniform sampler2D scene, solid, back, visible, jelly_front;
+uniform mat4 to_clip, to_key;
+uniform vec3 absorbed, key_extent;
+uniform float roughness;
+out vec4 light;
+
+const float bend = 1.36, cloud = 9.0;  // of refraction; scattered, a metre
+
+vec2 pixel_of(vec3 p) {
+  vec4 c = to_clip * vec4(p, 1);
+  return clamp((c.xy / max(c.w, 1e-4) * 0.5 + 0.5) * picture, vec2(0.5), picture - 0.5);
+}
+float entry(vec3 p) {  // way of the key light through the jelly to here
+  vec3 c = (to_key * vec4(p, 1)).xyz * 0.5 + 0.5;
+  float front = texture(jelly_front, c.xy).r;
+  return front < 1.0 ? clamp((c.z - front) * 2.0 * key_extent.z, 0.0, 0.4) : 0.0;
+}
+
+void main() {
+  vec3 n = normalize(facing), v = normalize(eye - place);
+  float nv = clamp(dot(n, v), 0.02, 1.0), fresnel = 0.024 + 0.976 * pow(1.0 - nv, 5.0);
+  vec4 seen = texelFetch(visible, ivec2(gl_FragCoord.xy), 0);
+  vec3 within = refract(-v, n, 1.0 / bend);
+
+  // The far side, found in three steps along planes.
+  vec4 far = texelFetch(back, ivec2(gl_FragCoord.xy), 0);
+  float way = far.w > 0.0 ? clamp((far.w - dot(place - eye, forward)) / max(0.1, dot(within, forward)), 0.001, 0.5) : 0.004;
+  vec3 far_n = far.w > 0.0 ? far.xyz : n;
+  for (int i = 0; i < 3; ++i) {
+    vec2 q = floor(pixel_of(place + way * within)) + 0.5;
+    far = texelFetch(back, ivec2(q), 0);
+    float along = dot(within, far.xyz);
+    if (far.w > 0.0 && along > 0.05) {
+      way = clamp(dot(place_at(q, far.w) - place, far.xyz) / along, 0.001, 0.5);
+      far_n = far.xyz;
+    } else {
+      way *= 0.75;
+    }
+  }
+  vec3 leaves = place + way * within;
+  vec3 beyond = refract(within, -far_n, bend);
+  bool mirrors = dot(beyond, beyond) < 0.5;
+  vec3 lost = absorbed + 0.5 * cloud;
+
+  vec3 behind;
+  float total = way;
+  if (mirrors) {
+    vec3 next = reflect(within, far_n);
+    total += 0.6 * way;
+    behind = 0.75 * mirrored(next, 0.5) * mix(0.4, 1.0, seen.z);
+  } else {
+    float there = texture(solid, pixel_of(leaves) / picture).w;
+    float gap = clamp((there - dot(leaves - eye, forward)) / max(0.15, dot(beyond, forward)), 0.0, 0.6);
+    vec2 at = pixel_of(leaves + gap * beyond);
+    if (texelFetch(solid, ivec2(at), 0).w < dot(place - eye, forward)) at = gl_FragCoord.xy;
+    vec2 spread = vec2(0.0015 + 0.02 * way) * picture.y;
+    behind = vec3(0);
+    for (int i = 0; i < 8; ++i) {
+      float a = float(i) * 2.399963;
+      behind += texture(scene, clamp((at + spread * sqrt((float(i) + 0.3) / 8.0) * vec2(cos(a), sin(a))) / picture, vec2(0), vec2(1))).rgb / 8.0;
+    }
+    // What meets the far side at a grazing angle is partly mirrored.
+    float out_nv = clamp(dot(beyond, far_n), 0.0, 1.0);
+    behind = mix(behind, 0.5 * mirrored(reflect(within, far_n), 0.5), 0.02 + 0.7 * pow(1.0 - out_nv, 4.0));
+  }
+
+  vec3 glow = vec3(0);
+  vec3 sky = sky_color * mix(0.35, 1.0, seen.z), ground = ground_color * floor_color * seen.w;
+  for (int i = 0; i < 8; ++i) {
+    float s = (float(i) + 0.5) / 8.0 * total;
+    vec3 p = place + min(s, way) * within;
+    vec3 here = key_color * mix(0.15, 1.0, seen.x) * exp(-absorbed * entry(p)) + rim_color * 0.25 * exp(-absorbed * 0.04);
+    here += (1.3 * sky + ground) * exp(-absorbed * 0.02);
+    glow += here * exp(-lost * s);
+  }
+  glow *= cloud * 0.30 * total / 8.0;
+
+  vec3 mirror = mirrored(reflect(-v, n), roughness);
+  // The skin: light scattered near the surface, which shows its form.
+  float wrap = max(0.0, (dot(n, key_direction) + 0.35) / 1.35);
+  vec3 skin = exp(-absorbed * 0.022) * (key_color * wrap * wrap * seen.x + sky * (0.5 + 0.5 * n.y) + 0.2 * rim_color * max(0.0, dot(n, rim_direction)));
+  light = vec4(fresnel * mirror * mix(0.4, 1.0, seen.z) + (1.0 - fresnel) * (behind * exp(-lost * total) + glow + 0.10 * skin), 1);
+})";
+
 }  // namespace
 
 std::string studio_functions() { return kStudio; }
@@ -392,6 +495,8 @@ std::string drop_fragment_shader() { return kVersion + place_of_pixel() + kStudi
 std::string narrow_fragment_shader() { return std::string(kVersion) + kNarrow; }
 std::string widen_fragment_shader() { return std::string(kVersion) + kWiden; }
 std::string resolve_fragment_shader() { return std::string(kVersion) + kResolve; }
+std::string tint_fragment_shader() { return std::string(kVersion) + kTint; }
+std::string jelly_fragment_shader() { return kVersion + place_of_pixel() + kStudio + kJelly; }
 std::string water_fragment_shader() { return kVersion + place_of_pixel() + kStudio + kWater; }
 
 }  // namespace hooke::render

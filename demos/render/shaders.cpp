@@ -284,6 +284,38 @@ float hash(vec2 c) {
   q += dot(q, q.yzx + 33.33);
   return fract((q.x + q.y) * q.z);
 }
+#if JELLY
+// What jelly between here and the key light leaves of it: the mean over a disc as wide as the light is,
+// seen from the jelly's far side.
+uniform sampler2D jelly_tint, jelly_front;
+uniform mat4 to_key;
+uniform vec3 key_extent;
+uniform float key_tan;
+vec3 through_jelly() {
+  vec3 c = (to_key * vec4(place, 1)).xyz * 0.5 + 0.5;
+  vec2 per_metre = 0.5 / key_extent.xy;
+  float metres = 2.0 * key_extent.z, turn = 6.2831853 * hash(gl_FragCoord.xy), most = 0.0;
+  for (int i = 0; i < 6; ++i) {
+    float a = float(i) * 2.399963 + turn;
+    vec2 at = c.xy + 0.025 * sqrt(float(i) / 6.0) * vec2(cos(a), sin(a)) * per_metre;
+    float front = texture(jelly_front, at).r;
+    float gap = (c.z - front) * metres - texture(jelly_tint, at).a;
+    most = max(most, front < 1.0 ? gap : 0.0);
+  }
+  float radius = clamp(key_tan * most, 0.003, 0.05);
+  vec3 sum = vec3(0);
+  for (int i = 0; i < 20; ++i) {
+    float a = float(i) * 2.399963 + turn;
+    vec2 at = c.xy + radius * sqrt((float(i) + 0.5) / 20.0) * vec2(cos(a), sin(a)) * per_metre;
+    vec4 tint = texture(jelly_tint, at);
+    bool behind = (c.z - texture(jelly_front, at).r) * metres > 0.003 && tint.a > 0.0;
+    sum += behind ? 0.88 * exp(-0.8 * max(tint.rgb, vec3(0))) : vec3(1);
+  }
+  return sum / 20.0;
+}
+#else
+vec3 through_jelly() { return vec3(1); }
+#endif
 float noise(vec2 c) {
   vec2 i = floor(c), f = fract(c);
   f = f * f * (3.0 - 2.0 * f);
@@ -393,7 +425,7 @@ vec3 floor_light(vec4 seen) {
   // The lamps light a pool around the subject that fades towards the background.
   float t = cloth_place.x;  // along the floor's profile
   float pool = mix(0.36, 1.0, exp(-0.42 * t * t));
-  vec3 key = key_color * key_direction.y * seen.x;
+  vec3 key = key_color * key_direction.y * seen.x * through_jelly();
   vec3 rim = rim_color * rim_direction.y * 0.14 * seen.y;
   return floor_color * (pool * (key + rim) + mix(0.3, 1.0, pool) * sky_color * seen.z);
 }
@@ -481,7 +513,7 @@ void main() {
 #endif
   light = vec4(result, 1);
 #else
-  vec3 result = lit_by(s, n, v, key_direction, key_color, seen.x) + lit_by(s, n, v, rim_direction, rim_color, seen.y);
+  vec3 result = lit_by(s, n, v, key_direction, key_color * through_jelly(), seen.x) + lit_by(s, n, v, rim_direction, rim_color, seen.y);
   float up = 0.5 + 0.5 * n.y;
   vec3 around = sky_color * up * seen.z + ground_color * floor_color * (1.0 - up) * seen.w;
   result += s.color * around;
@@ -579,11 +611,12 @@ std::string prepass_fragment_shader() { return std::string(kVersion) + kPrepass;
 std::string full_screen_vertex_shader() { return std::string(kVersion) + kFullScreenVertex; }
 std::string visibility_fragment_shader() { return kVersion + dome_size() + kPlaceOfPixel + kVisibility; }
 std::string blur_fragment_shader() { return std::string(kVersion) + kPlaceOfPixel + kBlur; }
-std::string lit_fragment_shader(Shade shade, bool lamps) {
+std::string lit_fragment_shader(Shade shade, bool lamps, bool jelly) {
   std::string choice;
   for (const auto& [name, which] :
        {std::pair{"FLOOR", Shade::Floor}, {"CLOTH", Shade::Cloth}, {"STONE", Shade::Stone}, {"METAL", Shade::Metal}})
     choice += std::string("#define ") + name + (shade == which ? " 1\n" : " 0\n");
+  choice += std::string("#define JELLY ") + (jelly ? "1\n" : "0\n");
   choice += "#define LAMPS " + std::to_string(lamps ? kMostLamps : 0) + "\n";
   if (shade == Shade::Metal) return kVersion + choice + kPlaceOfPixel + studio_functions() + kLit;
   return kVersion + choice + kPlaceOfPixel + kLit;

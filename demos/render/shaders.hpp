@@ -24,7 +24,8 @@ std::string full_screen_vertex_shader();
 std::string visibility_fragment_shader();
 std::string blur_fragment_shader();
 /// `lamps`: with the light of sparks.
-std::string lit_fragment_shader(Shade shade, bool lamps);
+/// `jelly`: with the colour of light that went through jelly.
+std::string lit_fragment_shader(Shade shade, bool lamps, bool jelly);
 /// `veil`, `glow`: with smoke and drops, with sparks over the solid picture.
 std::string develop_fragment_shader(bool veil, bool glow);
 
@@ -41,5 +42,7 @@ std::string narrow_fragment_shader();
 std::string widen_fragment_shader();
 std::string resolve_fragment_shader();
 std::string water_fragment_shader();
+std::string tint_fragment_shader();
+std::string jelly_fragment_shader();
 
 }  // namespace hooke::render

@@ -4,7 +4,8 @@
 //   2. a prepass, one sample a pixel: how far each pixel is and how it faces;
 //   3. visibility: from 1 and 2, how much of each light every pixel sees; then a blur;
 //   4. the lit picture, four samples a pixel, in linear light, with the sparks as lamps;
-//   5. water, which bends and mirrors the picture so far;
+//   5. jelly, one body after the other from far to near, then water: they bend and mirror the picture so far;
+//      jelly colours the key light in 4, by how much of it there is on the way;
 //   6. layers of one sample a pixel over it: smoke and drops; sparks and their bloom;
 //   7. development: tone curve, averaging, vignette and dither, down to 8 bits.
 // Passes that a picture has no use for are left out.
@@ -36,7 +37,8 @@ using Eigen::Matrix4f;
 using Eigen::Vector3f;
 
 constexpr int kSamples = 4;
-constexpr int kKeyMap = 2048, kRimMap = 1024, kDomeTile = 256;
+constexpr int kKeyMap = 2048, kRimMap = 1024, kDomeTile = 256, kJellyMap = 1024;
+constexpr double kJellyDepth = 0.05;  // [m] after which a jelly's colour is what is left of light
 constexpr int kDomeRows = kDomeDirections / kDomeColumns;
 static_assert(kDomeRows * kDomeColumns == kDomeDirections);
 
@@ -177,8 +179,9 @@ void require_drawable(const Model& model) {
     throw std::invalid_argument("weave and thickness must not be negative");
   if (!(m.wetness >= 0 && m.wetness <= 1))
     throw std::invalid_argument("wetness must be in [0, 1], got " + std::to_string(m.wetness));
-  if (model.thickness > 0 && (m.kind == Material::Kind::Water || m.kind == Material::Kind::Stone))
-    throw std::invalid_argument("water and stone must have no thickness");
+  if (model.thickness > 0 &&
+      (m.kind == Material::Kind::Water || m.kind == Material::Kind::Stone || m.kind == Material::Kind::Jelly))
+    throw std::invalid_argument("water, stone and jelly must have no thickness");
   if (model.subdivisions < 0 || model.subdivisions > 2)
     throw std::invalid_argument("subdivisions must be 0 to 2, got " + std::to_string(model.subdivisions));
 }
@@ -192,6 +195,13 @@ void require_look(const Look& look) {
 }
 
 bool is_water(const Model& model) { return model.material.kind == Material::Kind::Water; }
+bool is_jelly(const Model& model) { return model.material.kind == Material::Kind::Jelly; }
+bool is_solid(const Model& model) { return !is_water(model) && !is_jelly(model); }
+
+// What a metre of jelly takes of light, as an exponent.
+Vec3 absorbed_by(const Material& jelly) {
+  return -jelly.color.cwiseMax(0.004).cwiseMin(0.995).array().log().matrix() / kJellyDepth;
+}
 
 bool any_of_kind(std::span<const Particles> particles, bool sparks) {
   return std::any_of(particles.begin(), particles.end(), [&](const Particles& p) {
@@ -257,6 +267,14 @@ Material steel() {
   return material;
 }
 
+Material jelly() {
+  Material material;
+  material.kind = Material::Kind::Jelly;
+  material.color = {0.80, 0.06, 0.10};
+  material.roughness = 0.05;
+  return material;
+}
+
 Lights lights_of(const Look& look) {
   return {look.key_intensity * Vec3(2.05, 1.90, 1.68), look.rim_intensity * Vec3(1.35, 1.68, 2.15),
           look.fill_intensity * Vec3(0.40, 0.44, 0.50), look.fill_intensity * Vec3(0.95, 0.90, 0.85)};
@@ -305,11 +323,13 @@ struct Stage::Studio {
   Box upload(std::span<const Model> models);
   void draw_depth_maps(std::span<const Model> models, const Box& box);
   void draw_floor(gl::Program& program, const View& view);
-  void draw_prepass(std::span<const Model> models, const Frame& frame, bool water);
+  void draw_tint(std::span<const Model> models);
+  void draw_prepass(std::span<const Model> models, const Frame& frame, bool (*which)(const Model&));
   void draw_visibility(const Frame& frame, const Box& box);
   gl::Program& lit(Shade shade, bool lamps);
   void draw_lit(std::span<const Model> models, const Frame& frame);
   GLuint resolve();
+  void draw_jelly(std::span<const Model> models, const Frame& frame, const Box& box);
   void draw_water(std::span<const Model> models, const Frame& frame);
   Image develop(bool veil, bool glow);
   Image draw(std::span<const Model> models, std::span<const Particles> particles, const Camera& camera);
@@ -319,11 +339,15 @@ struct Stage::Studio {
   gl::Context context;
   gl::Program depth, prepass, floor_prepass, visibility, blur;
   // Compiled when first needed.
-  std::array<std::array<gl::Program, 2>, kShades> lit_programs;
+  std::array<std::array<gl::Program, 4>, kShades> lit_programs;
   std::array<gl::Program, 4> developers;
-  gl::Program resolver, water;
+  gl::Program resolver, water, tint, jelly_program;
   std::optional<Effects> effects;
   GLuint scene = 0, scene_target = 0;
+  // Jelly: seen from the key light, its colour and nearest side; seen from the camera, its far side and what is solid.
+  GLuint tint_map = 0, tint_target = 0, front_map = 0, front_target = 0, back = 0, back_target = 0, solid = 0,
+         solid_target = 0;
+  bool any_jelly = false;
   GLuint empty_array = 0, floor_array = 0;
   GLsizei floor_count = 0;
   GLuint key_map = 0, rim_map = 0, dome_map = 0, key_target = 0, rim_target = 0, dome_target = 0;
@@ -440,10 +464,11 @@ Box Stage::Studio::upload(std::span<const Model> models) {
 }
 
 void Stage::Studio::draw_depth_maps(std::span<const Model> models, const Box& box) {
-  const auto draw_into = [&](const Matrix4f& to_clip, Surface::Range (Surface::*range)() const) {
+  // Jelly dims the light from all around, not that of the lamps.
+  const auto draw_into = [&](const Matrix4f& to_clip, Surface::Range (Surface::*range)() const, bool jelly_too) {
     depth.set("to_clip", to_clip);
     for (std::size_t i = 0; i < models.size(); ++i)
-      if (!is_water(models[i])) uploaded[i].draw((*uploaded[i].surface.*range)());
+      if (is_solid(models[i]) || (jelly_too && is_jelly(models[i]))) uploaded[i].draw((*uploaded[i].surface.*range)());
   };
   depth.use();
   const Vec3 key_direction = look.key_direction.normalized(), rim_direction = look.rim_direction.normalized();
@@ -452,11 +477,11 @@ void Stage::Studio::draw_depth_maps(std::span<const Model> models, const Box& bo
   glBindFramebuffer(GL_FRAMEBUFFER, key_target);
   glViewport(0, 0, kKeyMap, kKeyMap);
   glClear(GL_DEPTH_BUFFER_BIT);
-  draw_into(key_view.to_clip, &Surface::sheet);
+  draw_into(key_view.to_clip, &Surface::sheet, false);
   glBindFramebuffer(GL_FRAMEBUFFER, rim_target);
   glViewport(0, 0, kRimMap, kRimMap);
   glClear(GL_DEPTH_BUFFER_BIT);
-  draw_into(rim_view.to_clip, &Surface::sheet);
+  draw_into(rim_view.to_clip, &Surface::sheet, false);
 
   glBindFramebuffer(GL_FRAMEBUFFER, dome_target);
   glClear(GL_DEPTH_BUFFER_BIT);
@@ -466,9 +491,47 @@ void Stage::Studio::draw_depth_maps(std::span<const Model> models, const Box& bo
     const LightView view = light_view(box, dome[static_cast<std::size_t>(k)], kDomeTile);
     dome_reach = std::max({dome_reach, view.half_size.x(), view.half_size.y()});
     glViewport(kDomeTile * (k % kDomeColumns), kDomeTile * (k / kDomeColumns), kDomeTile, kDomeTile);
-    draw_into(view.to_clip, &Surface::coarse);
+    draw_into(view.to_clip, &Surface::coarse, true);
     dome_views.push_back(view.to_clip);
   }
+}
+
+void Stage::Studio::draw_tint(std::span<const Model> models) {
+  if (!tint) {
+    tint = gl::Program("tint", depth_vertex_shader(), tint_fragment_shader());
+    jelly_program = gl::Program("jelly", surface_vertex_shader(), jelly_fragment_shader());
+    tint_map = gl::make_texture(GL_RGBA32F, kJellyMap, kJellyMap, GL_LINEAR);
+    tint_target = gl::make_framebuffer(GL_TEXTURE_2D, tint_map, 0);
+    front_map = gl::make_depth_map(kJellyMap, kJellyMap);
+    front_target = gl::make_framebuffer(GL_TEXTURE_2D, 0, front_map);
+    const int w = drawn_width(), h = drawn_height();
+    back = gl::make_texture(GL_RGBA32F, w, h, GL_NEAREST);
+    back_target = gl::make_framebuffer(GL_TEXTURE_2D, back, gl::make_texture(GL_DEPTH_COMPONENT32F, w, h, GL_NEAREST));
+    solid = gl::make_texture(GL_RGBA32F, w, h, GL_NEAREST);
+    solid_target = gl::make_framebuffer(GL_TEXTURE_2D, solid, 0);
+  }
+  glViewport(0, 0, kJellyMap, kJellyMap);
+  glBindFramebuffer(GL_FRAMEBUFFER, front_target);
+  glClear(GL_DEPTH_BUFFER_BIT);
+  depth.use();
+  depth.set("to_clip", key_view.to_clip);
+  for (std::size_t i = 0; i < models.size(); ++i)
+    if (is_jelly(models[i])) uploaded[i].draw(uploaded[i].surface->sheet());
+  glBindFramebuffer(GL_FRAMEBUFFER, tint_target);
+  glClear(GL_COLOR_BUFFER_BIT);
+  glDisable(GL_DEPTH_TEST);
+  glEnable(GL_BLEND);
+  glBlendFunc(GL_ONE, GL_ONE);
+  tint.use();
+  tint.set("to_clip", key_view.to_clip);
+  tint.set("metres", 2 * key_view.half_size.z());
+  for (std::size_t i = 0; i < models.size(); ++i) {
+    if (!is_jelly(models[i])) continue;
+    tint.set("absorbed", absorbed_by(models[i].material));
+    uploaded[i].draw(uploaded[i].surface->sheet());
+  }
+  glDisable(GL_BLEND);
+  glEnable(GL_DEPTH_TEST);
 }
 
 void Stage::Studio::draw_floor(gl::Program& program, const View& view) {
@@ -479,11 +542,12 @@ void Stage::Studio::draw_floor(gl::Program& program, const View& view) {
   glDrawElements(GL_TRIANGLES, floor_count, GL_UNSIGNED_INT, nullptr);
 }
 
-// The solid models and the floor; or the water, over what is there.
-void Stage::Studio::draw_prepass(std::span<const Model> models, const Frame& frame, bool wet) {
+// The solid models and the floor; or the jelly or water, over what is there.
+void Stage::Studio::draw_prepass(std::span<const Model> models, const Frame& frame, bool (*which)(const Model&)) {
+  const bool first = which == is_solid;
   glBindFramebuffer(GL_FRAMEBUFFER, prepass_target);
   glViewport(0, 0, drawn_width(), drawn_height());
-  if (!wet) glClear(GL_DEPTH_BUFFER_BIT | GL_COLOR_BUFFER_BIT);
+  if (first) glClear(GL_DEPTH_BUFFER_BIT | GL_COLOR_BUFFER_BIT);
   for (gl::Program* program : {&prepass, &floor_prepass}) {
     program->use();
     program->set("eye", frame.camera.eye);
@@ -493,11 +557,11 @@ void Stage::Studio::draw_prepass(std::span<const Model> models, const Frame& fra
   }
   prepass.use();
   for (std::size_t i = 0; i < models.size(); ++i) {
-    if (is_water(models[i]) != wet) continue;
+    if (!which(models[i])) continue;
     prepass.set("two_sided", models[i].thickness > 0 ? 0 : 1);
     uploaded[i].draw(uploaded[i].surface->all());
   }
-  if (wet) return;
+  if (!first) return;
   floor_prepass.use();
   draw_floor(floor_prepass, frame.view);
 }
@@ -541,16 +605,23 @@ void Stage::Studio::draw_visibility(const Frame& frame, const Box& box) {
 }
 
 gl::Program& Stage::Studio::lit(Shade shade, bool lamps) {
-  gl::Program& program = lit_programs[static_cast<std::size_t>(shade)][lamps];
+  gl::Program& program = lit_programs[static_cast<std::size_t>(shade)][(lamps ? 1u : 0u) + (any_jelly ? 2u : 0u)];
   if (!program)
     program = gl::Program("lit", shade == Shade::Floor ? floor_vertex_shader() : surface_vertex_shader(),
-                          lit_fragment_shader(shade, lamps));
+                          lit_fragment_shader(shade, lamps, any_jelly));
   return program;
 }
 
 void Stage::Studio::draw_lit(std::span<const Model> models, const Frame& frame) {
   glBindFramebuffer(GL_FRAMEBUFFER, light_target);
   glClear(GL_DEPTH_BUFFER_BIT | GL_COLOR_BUFFER_BIT);
+  const auto set_jelly_light = [&](gl::Program& program) {
+    program.set_texture("jelly_tint", 2, GL_TEXTURE_2D, tint_map);
+    program.set_texture("jelly_front", 3, GL_TEXTURE_2D, front_map);
+    program.set("to_key", key_view.to_clip);
+    program.set("key_extent", key_view.half_size);
+    program.set("key_tan", std::tan(0.5 * look.key_size));
+  };
   const auto prepare = [&](Shade shade) -> gl::Program& {
     gl::Program& program = lit(shade, !frame.lamps.empty());
     program.use();
@@ -559,10 +630,11 @@ void Stage::Studio::draw_lit(std::span<const Model> models, const Frame& frame) 
     program.set("to_clip", frame.view.to_clip);
     set_lights(program, frame.look);
     set_lamps(program, frame.lamps);
+    if (any_jelly) set_jelly_light(program);
     return program;
   };
   for (std::size_t i = 0; i < models.size(); ++i) {
-    if (is_water(models[i])) continue;
+    if (!is_solid(models[i])) continue;
     const Material& m = models[i].material;
     gl::Program& program = prepare(shade_of(m.kind));
     program.set("two_sided", models[i].thickness > 0 ? 0 : 1);
@@ -593,6 +665,52 @@ GLuint Stage::Studio::resolve() {
   glDrawArrays(GL_TRIANGLES, 0, 3);
   glEnable(GL_DEPTH_TEST);
   return scene;
+}
+
+void Stage::Studio::draw_jelly(std::span<const Model> models, const Frame& frame, const Box& box) {
+  const int w = drawn_width(), h = drawn_height();
+  glBindFramebuffer(GL_READ_FRAMEBUFFER, prepass_target);
+  glBindFramebuffer(GL_DRAW_FRAMEBUFFER, solid_target);
+  glBlitFramebuffer(0, 0, w, h, 0, 0, w, h, GL_COLOR_BUFFER_BIT, GL_NEAREST);
+  draw_prepass(models, frame, is_jelly);
+  draw_visibility(frame, box);
+
+  std::vector<std::pair<double, std::size_t>> far_to_near;
+  for (std::size_t i = 0; i < models.size(); ++i) {
+    if (!is_jelly(models[i]) || uploaded[i].surface->vertices().empty()) continue;
+    const Surface& surface = *uploaded[i].surface;
+    const Vec3 middle = 0.5 * (surface.lower() + surface.upper());
+    far_to_near.emplace_back(-(middle - frame.camera.eye).dot(frame.view.forward), i);
+  }
+  std::sort(far_to_near.begin(), far_to_near.end());
+  for (const auto& [unused, i] : far_to_near) {
+    resolve();
+    glBindFramebuffer(GL_FRAMEBUFFER, back_target);
+    glClear(GL_DEPTH_BUFFER_BIT | GL_COLOR_BUFFER_BIT);
+    glEnable(GL_CULL_FACE);
+    glCullFace(GL_FRONT);
+    prepass.use();
+    prepass.set("two_sided", 0);
+    uploaded[i].draw(uploaded[i].surface->all());
+    glCullFace(GL_BACK);
+    glBindFramebuffer(GL_FRAMEBUFFER, light_target);
+    gl::Program& program = jelly_program;
+    program.use();
+    set_pixels(program, frame);
+    set_lights(program, frame.look);
+    program.set_texture("scene", 1, GL_TEXTURE_2D, scene);
+    program.set_texture("solid", 2, GL_TEXTURE_2D, solid);
+    program.set_texture("back", 3, GL_TEXTURE_2D, back);
+    program.set_texture("visible", 4, GL_TEXTURE_2D, visible[0]);
+    program.set_texture("jelly_front", 5, GL_TEXTURE_2D, front_map);
+    program.set("to_clip", frame.view.to_clip);
+    program.set("to_key", key_view.to_clip);
+    program.set("key_extent", key_view.half_size);
+    program.set("absorbed", absorbed_by(models[i].material));
+    program.set("roughness", models[i].material.roughness);
+    uploaded[i].draw(uploaded[i].surface->all());
+    glDisable(GL_CULL_FACE);
+  }
 }
 
 void Stage::Studio::draw_water(std::span<const Model> models, const Frame& frame) {
@@ -667,12 +785,15 @@ Image Stage::Studio::draw(std::span<const Model> models, std::span<const Particl
 
   const Box box = upload(models);
   draw_depth_maps(models, box);
-  draw_prepass(models, frame, false);
+  any_jelly = std::any_of(models.begin(), models.end(), is_jelly);
+  if (any_jelly) draw_tint(models);
+  draw_prepass(models, frame, is_solid);
   draw_visibility(frame, box);
   draw_lit(models, frame);
+  if (any_jelly) draw_jelly(models, frame, box);
   if (std::any_of(models.begin(), models.end(), is_water)) {
     draw_water(models, frame);
-    draw_prepass(models, frame, true);
+    draw_prepass(models, frame, is_water);
   }
   bool veil = false, glow = false;
   if (any_of_kind(particles, true) || any_of_kind(particles, false)) {

@@ -27,10 +27,12 @@ struct Material {
     Cloth,  ///< woven: sheen at grazing angles, lining, thread detail, stitched hem
     Stone,  ///< sandstone, its layers and grains where it stands in the studio; must not move
     Metal,  ///< brushed around the vertical; mirrors the studio
-    Water   ///< clear: bends what is behind, mirrors the studio and the picture; throws no shadow
+    Water,  ///< clear: bends what is behind, mirrors the studio and the picture; throws no shadow
+    Jelly   ///< closed and clear with a glow inside: bends what is behind and throws a coloured shadow. Where it is
+            ///< subdivided, its edges are rounded
   };
   Kind kind = Kind::Matte;
-  /// Outside; the default is a warm grey mannequin. Water: what 10 cm of it leave of light.
+  /// Outside; the default is a warm grey mannequin. Water: what 10 cm of it leave of light; jelly: 5 cm.
   Vec3 color{0.38, 0.35, 0.32};
   Vec3 inside_color{0.105, 0.045, 0.060};  ///< what back faces show (cloth: the lining)
   Vec3 sheen{0.30, 0.12, 0.11};            ///< cloth: colour of the fuzz at grazing angles
@@ -44,6 +46,7 @@ struct Material {
 Material water();      ///< clear, a little blue-green
 Material sandstone();  ///< warm, dry
 Material steel();      ///< brushed
+Material jelly();      ///< raspberry
 
 /// A mesh and how to draw it. What the pointers name must live until draw() returns.
 /// Normals are computed from the mesh in every picture.

@@ -47,7 +47,8 @@ Surface::Surface(const Model& model)
     : given_(model.mesh->triangles),
       given_count_(model.mesh->vertices.rows()),
       thickness_(model.thickness),
-      subdivisions_(model.subdivisions) {
+      subdivisions_(model.subdivisions),
+      rounded_(model.material.kind == Material::Kind::Jelly) {
   for (std::size_t i = 0; i < given_.size(); ++i)
     for (int corner : given_[i])
       if (corner < 0 || corner >= given_count_)
@@ -74,7 +75,8 @@ bool Surface::fits(const Model& model) const {
   const bool same_uv =
       model.uv ? given_uv_.rows() == model.uv->rows() && (given_uv_ == *model.uv).all() : given_uv_.rows() == 0;
   return same_uv && model.mesh->vertices.rows() == given_count_ && model.thickness == thickness_ &&
-         model.subdivisions == subdivisions_ && model.mesh->triangles == given_;
+         model.subdivisions == subdivisions_ && (model.material.kind == Material::Kind::Jelly) == rounded_ &&
+         model.mesh->triangles == given_;
 }
 
 // Splits every edge; where the new vertices go is decided in update().
@@ -82,19 +84,20 @@ void Surface::subdivide() {
   std::unordered_map<std::uint64_t, int> middle_of;
   std::vector<Edge> edges;
   const int first = static_cast<int>(position_.size());
-  const auto middle = [&](int a, int b) {
+  const auto middle = [&](int a, int b, int opposite) {
     const auto [place, is_new] =
         middle_of.try_emplace(edge_key(std::min(a, b), std::max(a, b)), first + static_cast<int>(edges.size()));
     if (is_new) {
-      edges.push_back({a, b});
+      edges.push_back({a, b, opposite});
       if (!uv_.empty()) uv_.push_back(0.5 * (uv_[a] + uv_[b]));
     }
+    if (!is_new) edges[static_cast<std::size_t>(place->second - first)].right = opposite;
     return place->second;
   };
   std::vector<Triangle> finer;
   finer.reserve(4 * sheet_.size());
   for (const auto& [a, b, c] : sheet_) {
-    const int ab = middle(a, b), bc = middle(b, c), ca = middle(c, a);
+    const int ab = middle(a, b, c), bc = middle(b, c, a), ca = middle(c, a, b);
     finer.push_back({a, ab, ca});
     finer.push_back({ab, b, bc});
     finer.push_back({ca, bc, c});
@@ -158,7 +161,7 @@ void Surface::index_sheets() {
   if (thickness_ > 0) {
     for (const auto& [a, b, c] : sheet_)
       for (int corner : {a, c, b}) indices_.push_back(n + static_cast<std::uint32_t>(corner));
-    for (const auto& [a, b] : border_) {
+    for (const auto& [a, b, left, right] : border_) {
       const std::uint32_t ea = 2 * n + 2 * border_slot_[a], eb = 2 * n + 2 * border_slot_[b];
       const std::uint32_t top_a = a, top_b = b, low_a = ea + 1, low_b = eb + 1;
       for (std::uint32_t i : {top_b, top_a, ea, top_b, ea, eb, eb, ea, low_a, eb, low_a, low_b}) indices_.push_back(i);
@@ -221,8 +224,13 @@ void Surface::update(const Points<double>& vertices) {
   std::vector<Vec3> coarse;
   for (std::size_t level = 0; level < midpoints_.size(); ++level) {
     coarse.assign(position_.begin(), position_.begin() + static_cast<std::ptrdiff_t>(place));
+    if (rounded_) {
+      round_off(level, coarse);
+      place += midpoints_[level].size();
+      continue;
+    }
     add_angle_weighted_normals(level_triangles_[level], coarse, normal_);
-    for (const auto& [a, b] : midpoints_[level]) {
+    for (const auto& [a, b, left, right] : midpoints_[level]) {
       const Vec3 &pa = coarse[a], &pb = coarse[b], &na = normal_[a], &nb = normal_[b];
       position_[place++] = 0.5 * (pa + pb) - 0.125 * ((pb - pa).dot(na) * na + (pa - pb).dot(nb) * nb);
     }
@@ -234,6 +242,35 @@ void Surface::update(const Points<double>& vertices) {
   }
   add_angle_weighted_normals(sheet_, position_, normal_);
   write_sheets();
+}
+
+// One step of Loop's subdivision (1987), which moves the given vertices too: edges become round, about a
+// triangle wide, and flat faces stay flat. Warren's weights.
+void Surface::round_off(std::size_t level, const std::vector<Vec3>& coarse) {
+  std::vector<Vec3> sum(coarse.size(), Vec3::Zero()), along_border(coarse.size(), Vec3::Zero());
+  std::vector<int> count(coarse.size(), 0);
+  std::vector<bool> border(coarse.size(), false);
+  std::size_t place = coarse.size();
+  for (const Edge& e : midpoints_[level]) {
+    const auto a = static_cast<std::size_t>(e.a), b = static_cast<std::size_t>(e.b);
+    const Vec3 &pa = coarse[a], &pb = coarse[b];
+    sum[a] += pb, sum[b] += pa;
+    ++count[a], ++count[b];
+    if (e.right < 0) {
+      border[a] = border[b] = true;
+      along_border[a] += pb, along_border[b] += pa;
+      position_[place++] = 0.5 * (pa + pb);
+    } else {
+      position_[place++] = 0.375 * (pa + pb) + 0.125 * (coarse[static_cast<std::size_t>(e.left)] +
+                                                        coarse[static_cast<std::size_t>(e.right)]);
+    }
+  }
+  for (std::size_t i = 0; i < coarse.size(); ++i) {
+    if (count[i] == 0) continue;
+    const double share = count[i] > 3 ? 3.0 / 8 / count[i] : 3.0 / 16;
+    position_[i] = border[i] ? Vec3(0.75 * coarse[i] + 0.125 * along_border[i])
+                             : Vec3((1 - count[i] * share) * coarse[i] + share * sum[i]);
+  }
 }
 
 void Surface::set_cover(const Values<float>* values, float otherwise) {
@@ -251,7 +288,7 @@ void Surface::set_cover(const Values<float>* values, float otherwise) {
     }
     auto place = static_cast<std::size_t>(given_count_);
     for (const auto& level : midpoints_)
-      for (const auto& [a, b] : level) cover[place++] = 0.5f * (cover[a] + cover[b]);
+      for (const auto& [a, b, left, right] : level) cover[place++] = 0.5f * (cover[a] + cover[b]);
   }
   for (std::size_t i = 0; i < n; ++i) drawn_[i].side = cover[i];
 }
@@ -273,7 +310,7 @@ void Surface::write_sheets() {
   if (!(thickness_ > 0)) return;
 
   std::vector<Vec3> outward(border_vertices_.size(), Vec3::Zero());
-  for (const auto& [a, b] : border_) {
+  for (const auto& [a, b, left, right] : border_) {
     const Vec3 along = position_[b] - position_[a];
     for (int v : {a, b}) outward[border_slot_[v]] += unit_or(along.cross(normal_[v]), Vec3::Zero());
   }

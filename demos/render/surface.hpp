@@ -54,12 +54,14 @@ class Surface {
  private:
   struct Edge {
     int a, b;
+    int left = -1, right = -1;  // the corners opposite it; right: -1 on a border
   };
   void subdivide();
   void find_border();
   void measure_hem();
   void index_sheets();
   void index_coarse();
+  void round_off(std::size_t level, const std::vector<Vec3>& coarse);
   void write_sheets();
 
   std::vector<Triangle> given_;  // as the model has them
@@ -67,6 +69,7 @@ class Surface {
   TextureCoordinates given_uv_;
   double thickness_ = 0;
   int subdivisions_ = 0;
+  bool rounded_ = false;
 
   std::vector<std::vector<Edge>> midpoints_;            // one list of split edges a subdivision
   std::vector<std::vector<Triangle>> level_triangles_;  // before each subdivision

@@ -56,12 +56,20 @@ const Method& method_of(const std::string& name) {
   return method_named(name);
 }
 
-struct Lattice {
-  int columns = 0, rows = 0;  // 0: none
+softbody::Lattice lattice_of(const LatticeBox& box, const Material& material) {
+  if (const auto* fixed = std::get_if<softbody::FixedLatticeMaterial>(&material))
+    return softbody::lattice_from_box(box.size, box.points, *fixed, box.turn);
+  return softbody::lattice_from_box(box.size, box.points, std::get<softbody::LatticeMaterial>(material), box.turn);
+}
+
+// How the points of a body with named sides are laid out.
+struct Layout {
+  int columns = 0, rows = 0, layers = 1;  // 0: none
+  bool upwards = false;                   // row 0 is the bottom
 };
 
 void choose_points(const SceneDescription& scene, const std::string& path, const std::vector<PointChoice>& choices,
-                   Index count, const Lattice& lattice, std::vector<Index>& out) {
+                   Index count, const Layout& layout, std::vector<Index>& out) {
   for (std::size_t i = 0; i < choices.size(); ++i) {
     const std::string here = path + "[" + std::to_string(i) + "]";
     if (const auto* index = std::get_if<Index>(&choices[i])) {
@@ -71,13 +79,16 @@ void choose_points(const SceneDescription& scene, const std::string& path, const
       continue;
     }
     const std::string& name = std::get<std::string>(choices[i]);
-    if (lattice.rows == 0) fail(scene, here, "only grids and capes have edges, got \"" + name + "\"");
+    if (layout.rows == 0) fail(scene, here, "only grids, capes and lattices have sides, got \"" + name + "\"");
     const auto on = [&](const char* side) { return name.find(side) != std::string::npos; };
-    for (int row = 0; row < lattice.rows; ++row)
-      for (int column = 0; column < lattice.columns; ++column)
-        if ((!on("top") || row == 0) && (!on("bottom") || row == lattice.rows - 1) && (!on("left") || column == 0) &&
-            (!on("right") || column == lattice.columns - 1))
-          out.push_back(Index(row) * lattice.columns + column);
+    const int last = layout.rows - 1, top = layout.upwards ? last : 0;
+    for (int layer = 0; layer < layout.layers; ++layer)
+      for (int row = 0; row < layout.rows; ++row)
+        for (int column = 0; column < layout.columns; ++column)
+          if ((!on("top") || row == top) && (!on("bottom") || row == last - top) && (!on("left") || column == 0) &&
+              (!on("right") || column == layout.columns - 1) && (!on("back") || layer == 0) &&
+              (!on("front") || layer == layout.layers - 1))
+            out.push_back((Index(layer) * layout.rows + row) * layout.columns + column);
   }
   std::vector<Index> once;
   std::vector<bool> seen(std::size_t(count), false);
@@ -88,12 +99,12 @@ void choose_points(const SceneDescription& scene, const std::string& path, const
   out = std::move(once);
 }
 
-void lay_out_uv(const Lattice& lattice, double width, double height, SceneBody& out) {
-  out.uv.resize(Index(lattice.columns) * lattice.rows, 2);
-  for (int row = 0; row < lattice.rows; ++row)
-    for (int column = 0; column < lattice.columns; ++column)
-      out.uv.row(Index(row) * lattice.columns + column) << double(column) / (lattice.columns - 1) * width,
-          double(row) / (lattice.rows - 1) * height;
+void lay_out_uv(const Layout& layout, double width, double height, SceneBody& out) {
+  out.uv.resize(Index(layout.columns) * layout.rows, 2);
+  for (int row = 0; row < layout.rows; ++row)
+    for (int column = 0; column < layout.columns; ++column)
+      out.uv.row(Index(row) * layout.columns + column) << double(column) / (layout.columns - 1) * width,
+          double(row) / (layout.rows - 1) * height;
 }
 
 class Builder {
@@ -194,7 +205,7 @@ class Builder {
   void add_body(const SoftBody& description) {
     SceneBody out;
     softbody::SoftBodySettings settings;
-    Lattice lattice;
+    Layout layout;
     std::optional<Cape> cape;
     if (const auto* raw = std::get_if<RawPoints>(&description.form)) {
       settings.positions = raw->points;
@@ -205,30 +216,36 @@ class Builder {
     } else if (const auto* grid = std::get_if<Grid>(&description.form)) {
       settings =
           told_at(d_, description.path, [&] { return softbody::settings_of(cloth_of(*grid, description.material)); });
-      lattice = {grid->columns, grid->rows};
-      lay_out_uv(lattice, grid->width, grid->height, out);
+      layout = {grid->columns, grid->rows, 1, false};
+      lay_out_uv(layout, grid->width, grid->height, out);
     } else if (const auto* mesh = std::get_if<MeshFile>(&description.form)) {
       settings = told_at(d_, description.path + ".mesh", [&] {
         return softbody::settings_of(softbody::cloth_from_mesh(
             io::read_obj(mesh->file), std::get<softbody::ClothMaterial>(description.material)));
       });
+    } else if (const auto* box = std::get_if<LatticeBox>(&description.form)) {
+      settings = told_at(d_, description.path + ".lattice",
+                         [&] { return softbody::settings_of(lattice_of(*box, description.material)); });
+      settings.positions.rowwise() += box->center.transpose().array();
+      layout = {box->points[0], box->points[1], box->points[2], true};
     } else {
       const auto& cut = std::get<CapeCut>(description.form);
       cape = dress_human(description, cut, out);
       settings = softbody::settings_of(cape->cloth);
-      lattice = {cut.columns, cut.rows};
-      lay_out_uv(lattice, cut.width, cut.height, out);
+      layout = {cut.columns, cut.rows, 1, false};
+      lay_out_uv(layout, cut.width, cut.height, out);
     }
     settings.name = description.name;
     settings.origin = description.origin;
     const Index count = settings.positions.rows();
-    choose_points(d_, description.path + ".pin", description.pin, count, lattice, settings.pins);
+    choose_points(d_, description.path + ".pin", description.pin, count, layout, settings.pins);
     settings.linear_drag = description.linear_drag;
     settings.quadratic_drag = description.quadratic_drag;
     settings.motion.thickness = description.thickness;
     settings.motion.dt = description.solver.dt;
     settings.motion.tolerance = description.solver.tolerance;
     settings.motion.iterations = description.solver.iterations;
+    settings.motion.compensated = description.solver.compensated;
     settings.motion.method = &method_of(description.solver.method);
     settings.wanted_error = description.solver.wanted_error;
     settings.precision = description.solver.precision;
@@ -245,8 +262,9 @@ class Builder {
     out.thickness = description.thickness;
     out.color = description.color;
     out.inside_color = description.inside_color;
+    out.look = description.look;
     if (cape) wear(*cape, out);
-    drive_pins(description, lattice, *body, out);
+    drive_pins(description, layout, *body, out);
     if (description.solver.error > 0) {
       told_at(d_, description.path + ".solver.error", [&] { choose(description.solver.error, settings, out); });
       body = softbody::make_soft_body(settings);
@@ -296,7 +314,7 @@ class Builder {
     };
   }
 
-  void drive_pins(const SoftBody& description, const Lattice& lattice, const Body& body, SceneBody& out) {
+  void drive_pins(const SoftBody& description, const Layout& layout, const Body& body, SceneBody& out) {
     if (description.pin_motion.empty()) return;
     if (out.wears >= 0) fail(d_, description.path + ".pin_motion", "a cape hangs on its human");
     struct Driven {
@@ -310,7 +328,7 @@ class Builder {
     for (std::size_t g = 0; g < description.pin_motion.size(); ++g) {
       const std::string path = description.path + ".pin_motion[" + std::to_string(g) + "].points";
       std::vector<Index> points;
-      choose_points(d_, path, description.pin_motion[g].points, body.size(), lattice, points);
+      choose_points(d_, path, description.pin_motion[g].points, body.size(), layout, points);
       for (const Index point : points) {
         if (taken[std::size_t(point)]) fail(d_, path, "point " + std::to_string(point) + " is driven by two groups");
         taken[std::size_t(point)] = true;

@@ -16,7 +16,7 @@
 
 namespace hooke::scene {
 
-/// Points by index or as an edge of a grid ("top", "bottom-left", …).
+/// Points by index or as an edge of a grid ("top", "bottom-left", …) or a face, edge or corner of a lattice.
 using PointChoice = std::variant<Index, std::string>;
 
 struct PinDrive {
@@ -39,6 +39,12 @@ struct Grid {
 struct MeshFile {
   std::filesystem::path file;
 };
+struct LatticeBox {
+  Vec3 size{1, 1, 1};
+  std::array<int, 3> points{2, 2, 2};
+  Vec3 center{0, 0, 0};          ///< of the box, relative to the body's origin [m]
+  Mat3 turn = Mat3::Identity();  ///< "rotation"
+};
 struct CapeCut {
   std::string human;  ///< name of a human collider
   double width = 0.9, height = 1.2;
@@ -51,7 +57,9 @@ struct FixedMaterial {
   double structural = 0, shear = 0, bend = 0;  ///< "stiffness" of each spring [N/m]
   double damping = 0;                          ///< of each spring [N·s/m]
 };
-using Material = std::variant<softbody::ClothMaterial, FixedMaterial>;
+/// The last two are for lattices.
+using Material =
+    std::variant<softbody::ClothMaterial, FixedMaterial, softbody::LatticeMaterial, softbody::FixedLatticeMaterial>;
 
 struct Solver {
   double error = 0;  ///< wanted, as a share of the body's size: the chooser picks all below; 0: they are given
@@ -61,13 +69,17 @@ struct Solver {
   int iterations = 0;       ///< of xpbd, as MotionSettings::iterations; 0: its default
   double wanted_error = 0;  ///< of filtered-leapfrog [m], as SoftBodySettings::wanted_error; 0: none
   softbody::Precision precision = softbody::Precision::Automatic;  // particles: float
+  bool compensated = true;                                         ///< as MotionSettings
 };
+
+/// What a soft body's surface is drawn as.
+enum class BodyLook { Cloth, Jelly };
 
 struct SoftBody {
   std::string name;
   std::string path;  ///< in the file, for messages: bodies[0]
   Vec3 origin{0, 0, 0};
-  std::variant<RawPoints, Grid, MeshFile, CapeCut> form;
+  std::variant<RawPoints, Grid, MeshFile, CapeCut, LatticeBox> form;
   Material material;
   std::vector<PointChoice> pin;
   std::vector<PinDrive> pin_motion;
@@ -75,6 +87,7 @@ struct SoftBody {
   double linear_drag = 0, quadratic_drag = 0;
   double thickness = 0;
   std::optional<Vec3> color, inside_color;
+  BodyLook look = BodyLook::Cloth;  ///< lattices: jelly where the file does not say
   Solver solver;
 };
 
@@ -116,8 +129,9 @@ struct ColliderDescription {
 
 struct CameraDescription {
   Vec3 eye{0, 1.3, 5}, target{0, 0.9, 0};
-  double fov = 30;      ///< [degrees]
-  bool follow = false;  ///< eye and target are relative to where the first human walks
+  double fov = 30;       ///< [degrees]
+  Vec3 origin{0, 0, 0};  ///< in the world [m]; everything is drawn relative to it, and so are eye and target
+  bool follow = false;   ///< eye and target are relative to where the first human walks
 };
 
 struct SceneDescription {

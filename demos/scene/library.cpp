@@ -23,15 +23,14 @@ std::vector<std::filesystem::path> scene_folders() {
   return out;
 }
 
-std::filesystem::path file_of(const std::string& name) {
+}  // namespace
+
+std::filesystem::path scene_file(const std::string& name) {
   std::error_code error;
-  if (name.find('/') != std::string::npos) return {};
   for (const auto& folder : scene_folders())
     if (const auto path = folder / (name + ".json"); std::filesystem::is_regular_file(path, error)) return path;
   return {};
 }
-
-}  // namespace
 
 std::vector<NamedScene> named_scenes() {
   std::vector<NamedScene> out;
@@ -61,7 +60,7 @@ SceneDescription find_scene(const std::string& path_or_name) {
     if (scene.description) return *std::move(scene.description);
     throw Error(path_or_name + " is a scene of the report alone (hooke report): no scene file can say it");
   }
-  if (const auto path = file_of(path_or_name); !path.empty()) return read_scene(path);
+  if (const auto path = scene_file(path_or_name); !path.empty()) return read_scene(path);
   std::string names;
   for (const NamedScene& scene : named_scenes()) names += (names.empty() ? "" : ", ") + scene.name;
   throw Error(path_or_name + ": there is no such scene file, nor a scene of that name; there are " + names);

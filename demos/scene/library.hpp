@@ -3,6 +3,7 @@
 
 #include <scene/standard.hpp>
 
+#include <filesystem>
 #include <string>
 #include <vector>
 
@@ -17,5 +18,8 @@ std::vector<NamedScene> named_scenes();
 
 /// A scene by path or by name. Throws hooke::Error, which lists the names where there is neither.
 SceneDescription find_scene(const std::string& path_or_name);
+
+/// The file of a scene that comes with Hooke; empty where there is none of that name.
+std::filesystem::path scene_file(const std::string& name);
 
 }  // namespace hooke::scene

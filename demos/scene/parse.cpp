@@ -40,16 +40,19 @@ Index read_point(const Value& value, Index count) {
   return value.whole(0, count - 1);
 }
 
-std::vector<PointChoice> read_choices(const Value& value) {
+std::vector<PointChoice> read_choices(const Value& value, bool lattice) {
   std::vector<PointChoice> out;
+  std::vector<std::string> names{"top",      "bottom",    "left",        "right",
+                                 "top-left", "top-right", "bottom-left", "bottom-right"};
+  if (lattice) names.insert(names.end(), {"front", "back"});
   const auto one = [&](const Value& choice) {
     if (choice.json().is_string())
-      out.emplace_back(
-          choice.choice({"top", "bottom", "left", "right", "top-left", "top-right", "bottom-left", "bottom-right"}));
+      out.emplace_back(choice.choice(names));
     else if (choice.json().is_number_integer())
       out.emplace_back(choice.whole(0, kMostPoints - 1));
     else
-      choice.fail_got("must be a point index or the name of an edge or corner");
+      choice.fail_got(lattice ? "must be a point index or the name of a face or edge"
+                              : "must be a point index or the name of an edge or corner");
   };
   if (value.json().is_string()) {
     one(value);
@@ -98,7 +101,7 @@ RawPoints read_raw(const Object& body) {
 
 // "size" and "points" of grids and capes.
 template <class Form>
-void read_lattice(const Object& object, Form& form) {
+void read_sheet(const Object& object, Form& form) {
   if (const auto size = object.find("size")) {
     if (size->array() != 2) size->fail_got("must be [width, height]");
     form.width = size->at(0).number(Range::positive(), "m");
@@ -117,7 +120,7 @@ Grid read_grid(const Object& grid) {
   Grid form;
   grid["size"];
   grid["points"];
-  read_lattice(grid, form);
+  read_sheet(grid, form);
   if (grid.has("right")) form.right = read_direction(grid["right"]);
   if (grid.has("down")) form.down = read_direction(grid["down"]);
   if (!(form.right.normalized().cross(form.down.normalized()).norm() > 1e-6))
@@ -125,10 +128,33 @@ Grid read_grid(const Object& grid) {
   return form;
 }
 
+Mat3 read_rotation(const Object& rotation) {
+  const Vec3 axis = read_direction(rotation["axis"]).normalized();
+  return Eigen::AngleAxisd(rotation["angle"].number(Range::any(), "degrees") * std::numbers::pi / 180, axis).matrix();
+}
+
+LatticeBox read_lattice(const Object& lattice) {
+  LatticeBox form;
+  const Value size = lattice["size"], points = lattice["points"];
+  if (size.array() != 3) size.fail_got("must be [x, y, z]");
+  if (points.array() != 3) points.fail_got("must be [nx, ny, nz]");
+  Index count = 1;
+  for (std::size_t k = 0; k < 3; ++k) {
+    form.size[Index(k)] = size.at(k).number(Range::positive(), "m");
+    form.points[k] = int(points.at(k).whole(2, kMostPoints / 4));
+    if (form.points[k] > kMostPoints / count)
+      points.fail("must make at most " + std::to_string(kMostPoints) + " points");
+    count *= form.points[k];
+  }
+  form.center = lattice.vec3("center", form.center);
+  if (const auto rotation = lattice.find("rotation")) form.turn = read_rotation(Object(*rotation, "rotation"));
+  return form;
+}
+
 CapeCut read_cape(const Object& cape) {
   CapeCut form;
   form.human = cape["human"].text();
-  read_lattice(cape, form);
+  read_sheet(cape, form);
   return form;
 }
 
@@ -152,10 +178,30 @@ softbody::ClothMaterial read_cloth_material(const Object& object) {
   return material;
 }
 
-Material read_material(const Value& value, bool grid) {
+softbody::LatticeMaterial read_lattice_material(const Object& object) {
+  softbody::LatticeMaterial material;
+  material.density = object.number("density", material.density, Range::positive(), "kg/m3");
+  material.young = object.number("young", material.young, Range::positive(), "Pa");
+  const Range poisson{0.25, 0.5, true, false, "at least 0.25 and below 0.5"};
+  material.poisson_ratio = object.number("poisson_ratio", material.poisson_ratio, poisson);
+  material.damping_ratio = object.number("damping_ratio", material.damping_ratio, Range::not_negative());
+  return material;
+}
+
+softbody::FixedLatticeMaterial read_fixed_lattice_material(const Object& object) {
+  softbody::FixedLatticeMaterial material;
+  material.mass = object["mass"].number(Range::positive(), "kg");
+  material.stiffness = object["stiffness"].number(Range::not_negative(), "N/m");
+  material.damping_ratio = object.number("damping_ratio", material.damping_ratio, Range::not_negative());
+  return material;
+}
+
+Material read_material(const Value& value, bool grid, bool lattice) {
   const bool fixed = value.json().is_object() && (value.json().contains("mass") || value.json().contains("stiffness"));
+  if (lattice && fixed) return read_fixed_lattice_material(Object(value, "fixed_lattice_material"));
+  if (lattice) return read_lattice_material(Object(value, "lattice_material"));
   if (!fixed) return read_cloth_material(Object(value, "cloth_material"));
-  if (!grid) value.fail("mass and stiffness are for grids; give density, stretch, shear and bend here");
+  if (!grid) value.fail("mass and stiffness are for grids and lattices; give density, stretch, shear and bend here");
   const Object object(value, "fixed_material");
   FixedMaterial material;
   material.mass = object["mass"].number(Range::positive(), "kg");
@@ -207,6 +253,7 @@ Solver read_solver(const Object& object) {
     if (solver.method != softbody::xpbd().name) iterations->fail("is for xpbd, got the method " + solver.method);
     solver.iterations = int(iterations->whole(1, 1000));
   }
+  if (object.has("compensated")) solver.compensated = object["compensated"].truth();
   if (const auto precision = object.find("precision"))
     solver.precision = softbody::precision_named(precision->choice({"float", "double", "double-float"}));
   return solver;
@@ -220,30 +267,36 @@ SoftBody read_soft(const Value& value, std::size_t number, const std::filesystem
   body.origin = object.vec3("origin", body.origin);
 
   int forms = 0;
-  for (const char* key : {"points", "grid", "mesh", "cape"}) forms += object.has(key);
-  if (forms != 1) value.fail("needs exactly one of points, grid, mesh and cape, got " + std::to_string(forms));
-  const bool raw = object.has("points"), grid = object.has("grid"), cape = object.has("cape");
+  for (const char* key : {"points", "grid", "mesh", "cape", "lattice"}) forms += object.has(key);
+  if (forms != 1) value.fail("needs exactly one of points, grid, mesh, cape and lattice, got " + std::to_string(forms));
+  const bool raw = object.has("points"), grid = object.has("grid"), cape = object.has("cape"),
+             lattice = object.has("lattice");
   if (raw) body.form = read_raw(object);
   if (grid) body.form = read_grid(Object(object["grid"], "grid"));
   if (object.has("mesh")) body.form = MeshFile{folder / object["mesh"].text()};
   if (cape) body.form = read_cape(Object(object["cape"], "cape"));
+  if (lattice) {
+    body.form = read_lattice(Object(object["lattice"], "lattice"));
+    body.material = softbody::LatticeMaterial{};
+    body.look = BodyLook::Jelly;
+  }
 
   for (const char* key : {"velocities", "masses", "mass", "springs", "pins"})
     if (!raw && object.has(key))
       object[key].fail(std::string("belongs to raw points") +
-                       (std::string(key) == "pins" ? "; grids and meshes have \"pin\"" : ""));
+                       (std::string(key) == "pins" ? "; grids, meshes and lattices have \"pin\"" : ""));
   if (raw && object.has("material"))
-    object["material"].fail("belongs to grids, meshes and capes; raw points have springs");
-  if (raw && object.has("pin")) object["pin"].fail("belongs to grids and meshes; raw points have \"pins\"");
-  if (raw && object.has("wind")) object["wind"].fail("needs triangles: a grid, a mesh or a cape");
+    object["material"].fail("belongs to grids, meshes, capes and lattices; raw points have springs");
+  if (raw && object.has("pin")) object["pin"].fail("belongs to grids, meshes and lattices; raw points have \"pins\"");
+  if (raw && object.has("wind")) object["wind"].fail("needs triangles: a grid, a mesh, a cape or a lattice");
   if (cape && object.has("origin")) object["origin"].fail("a cape begins on its human's shoulders");
 
-  if (object.has("material")) body.material = read_material(object["material"], grid);
-  if (object.has("pin")) body.pin = read_choices(object["pin"]);
+  if (object.has("material")) body.material = read_material(object["material"], grid, lattice);
+  if (object.has("pin")) body.pin = read_choices(object["pin"], lattice);
   if (const auto groups = object.find("pin_motion"))
     for (std::size_t i = 0; i < groups->array(); ++i) {
       const Object group(groups->at(i), "pin_motion");
-      body.pin_motion.push_back({read_choices(group["points"]), read_drive(group)});
+      body.pin_motion.push_back({read_choices(group["points"], lattice), read_drive(group)});
     }
   if (object.has("wind")) body.wind = read_wind(Object(object["wind"], "wind"));
   if (object.has("drag")) {
@@ -254,6 +307,11 @@ SoftBody read_soft(const Value& value, std::size_t number, const std::filesystem
   body.thickness = object.number("thickness", cape ? CapeSettings().thickness : 0, Range::not_negative(), "m");
   if (object.has("color")) body.color = read_color(object["color"]);
   if (object.has("inside_color")) body.inside_color = read_color(object["inside_color"]);
+  if (object.has("look")) {
+    const std::vector<std::string> names{"cloth", "jelly"};
+    if (raw) object["look"].fail("needs triangles: a grid, a mesh, a cape or a lattice");
+    body.look = BodyLook(std::find(names.begin(), names.end(), object["look"].choice(names)) - names.begin());
+  }
   if (object.has("solver")) body.solver = read_solver(Object(object["solver"], "solver"));
   return body;
 }
@@ -295,12 +353,7 @@ Box read_box(const Object& object) {
   const Value size = object["size"];
   if (size.array() != 3) size.fail_got("must be an array of 3 numbers");
   for (int k = 0; k < 3; ++k) box.half_extent[k] = size.at(std::size_t(k)).number(Range::positive(), "m") / 2;
-  if (const auto found = object.find("rotation")) {
-    const Object rotation(*found, "rotation");
-    const Vec3 axis = read_direction(rotation["axis"]).normalized();
-    box.axes =
-        Eigen::AngleAxisd(rotation["angle"].number(Range::any(), "degrees") * std::numbers::pi / 180, axis).matrix();
-  }
+  if (const auto rotation = object.find("rotation")) box.axes = read_rotation(Object(*rotation, "rotation"));
   return box;
 }
 
@@ -392,6 +445,7 @@ CameraDescription read_camera(const Object& object) {
   CameraDescription camera;
   camera.eye = object["eye"].vec3();
   camera.target = object["target"].vec3();
+  camera.origin = object.vec3("origin", camera.origin);
   camera.fov = object.number("fov", camera.fov, Range::between(1, 120, "from 1 to 120"), "degrees");
   if (object.has("follow")) camera.follow = object["follow"].truth();
   const Vec3 sight = camera.target - camera.eye;

@@ -25,6 +25,7 @@ struct SceneBody {
   std::vector<bool> held;    ///< by point: pinned or driven
   double thickness = 0;      ///< [m]
   std::optional<Vec3> color, inside_color;
+  BodyLook look = BodyLook::Cloth;
   std::vector<Index> driven;                     ///< points that follow `targets`
   PinMotion targets;                             ///< empty where nothing is driven
   int wears = -1;                                ///< a cape: which of Scene::humans carries it

@@ -243,6 +243,8 @@ TEST_F(Command, BadInputIsExitCodeTwoAndOneLine) {
       {"render " + good + " --out " + out() + ".png --size large", "--size must be WIDTHxHEIGHT"},
       {"render " + good + " --out " + out() + ".png --supersample 9", "--supersample"},
       {"render " + good + " --out " + out() + ".mp4 --frame-at 1", "--frame-at is for a PNG"},
+      {"panels " + broken + " --out " + out() + ".png", "broken.json"},
+      {"panels no-such --out " + out() + ".png", "no such file of panels"},
       {"dance", "dance"},
       {"", "a command is needed"},
   };
@@ -252,6 +254,27 @@ TEST_F(Command, BadInputIsExitCodeTwoAndOneLine) {
     EXPECT_THAT(result.err, HasSubstr(words)) << arguments;
     EXPECT_EQ(lines_of(result.err).size(), 1u) << arguments << "\n" << result.err;
     EXPECT_FALSE(exists(folder_ / "run")) << arguments;
+  }
+}
+
+TEST_F(Command, DrawsPanelsSideBySideAndFailsWhereOneDivergesThatMustNot) {
+  const auto file = [&](const char* name, const char* may) {
+    return folder_
+        .write(name, std::string(R"({"hooke": 1, "energy_curve": true, "figures": ["energy", "speed", "stretch"],
+      "scene": {"hooke": 1, "duration": 0.5, "frame_rate": 20,
+        "bodies": [{"type": "soft", "points": [[0,0,0], [1.5,0,0]], "mass": 1, "pins": [0],
+                    "springs": [{"points": [0,1], "stiffness": 1e5, "rest_length": 1}], "solver": {"dt": 0.004}}]},
+      "panels": [{"title": "calm", "set": {"/bodies/0/solver/method": "implicit-euler"}},
+                 {"title": "wild", "set": {"/bodies/0/solver/method": "explicit-euler"}, "may_diverge": )") +
+                         may + "}]}")
+        .string();
+  };
+  for (const auto& [name, may, code] : {std::tuple{"one.json", "true", 0}, {"two.json", "false", 1}}) {
+    const std::string out = (folder_ / (std::string(name) + ".png")).string();
+    const Result result = run("panels " + file(name, may) + " --out " + out + " --frame-at 0.5 --size 260x160");
+    EXPECT_EQ(result.code, code) << result.err;
+    EXPECT_TRUE(exists(std::filesystem::path(out)));
+    EXPECT_EQ(result.err.find("\"wild\" diverged") != std::string::npos, code == 1) << result.err;
   }
 }
 

@@ -100,6 +100,8 @@ Index points_of(const SceneDescription& scene) {
   Index count = 0;
   for (const SoftBody& body : scene.bodies) {
     if (const auto* grid = std::get_if<Grid>(&body.form)) count += Index(grid->columns) * grid->rows;
+    if (const auto* box = std::get_if<LatticeBox>(&body.form))
+      count += Index(box->points[0]) * box->points[1] * box->points[2];
     if (const auto* cape = std::get_if<CapeCut>(&body.form)) count += Index(cape->columns) * cape->rows;
     if (const auto* raw = std::get_if<RawPoints>(&body.form)) count += raw->points.rows();
   }

@@ -15,6 +15,10 @@ std::string raw(const std::string& keys) {
 std::string grid(const std::string& keys) {
   return with_body(R"({"type": "soft", "name": "a", "grid": {"size": [1, 1], "points": [3, 4]}, )" + keys + "}");
 }
+std::string lattice(const std::string& keys, const std::string& points = "[3, 3, 3]") {
+  return with_body(R"({"type": "soft", "name": "a", "lattice": {"size": [0.1, 0.1, 0.1], "points": )" + points + "}" +
+                   (keys.empty() ? "" : ", " + keys) + "}");
+}
 std::string spring(const std::string& keys) { return raw(R"("mass": 1, "springs": [{)" + keys + "}]"); }
 
 const std::vector<BrokenCase>& cases() {
@@ -55,9 +59,9 @@ const std::vector<BrokenCase>& cases() {
        "bodies[0].type: must be one of soft, particles, rigid, got \"jelly\""},
       {"RigidNotYet", with_body(R"({"type": "rigid"})"), "bodies[0].type: bodies of type \"rigid\" are not available"},
       {"NoForm", with_body(R"({"type": "soft"})"),
-       "bodies[0]: needs exactly one of points, grid, mesh and cape, got 0"},
+       "bodies[0]: needs exactly one of points, grid, mesh, cape and lattice, got 0"},
       {"TwoForms", grid(R"("points": [[0,0,0]])"),
-       "bodies[0]: needs exactly one of points, grid, mesh and cape, got 2"},
+       "bodies[0]: needs exactly one of points, grid, mesh, cape and lattice, got 2"},
       {"EmptyName", with_body(R"({"type": "soft", "name": ""})"), "bodies[0].name: must not be empty"},
       {"NameTwice", with_body(R"({"type": "soft", "name": "a", "points": [[0,0,0]], "mass": 1},
                     {"type": "soft", "name": "a", "points": [[0,0,0]], "mass": 1})"),
@@ -92,8 +96,9 @@ const std::vector<BrokenCase>& cases() {
        "rest_length: must be 0 or more [m]"},
       {"SpringDamping", spring(R"("points": [0, 1], "stiffness": 1, "damping": "high")"), "damping: must be a number"},
       {"PinsRange", raw(R"("mass": 1, "pins": [0, 4])"), "bodies[0].pins[1]: must be below the point count 4, got 4"},
-      {"PinOnRaw", raw(R"("mass": 1, "pin": [0])"), "bodies[0].pin: belongs to grids and meshes"},
-      {"PinsOnGrid", grid(R"("pins": [0])"), "bodies[0].pins: belongs to raw points; grids and meshes have \"pin\""},
+      {"PinOnRaw", raw(R"("mass": 1, "pin": [0])"), "bodies[0].pin: belongs to grids, meshes and lattices"},
+      {"PinsOnGrid", grid(R"("pins": [0])"),
+       "bodies[0].pins: belongs to raw points; grids, meshes and lattices have \"pin\""},
       {"MassesOnGrid", grid(R"("masses": [1])"), "bodies[0].masses: belongs to raw points"},
       {"WindOnRaw", raw(R"("mass": 1, "wind": {})"), "bodies[0].wind: needs triangles"},
       {"MaterialOnRaw", raw(R"("mass": 1, "material": {})"), "bodies[0].material: belongs to grids"},
@@ -143,6 +148,33 @@ const std::vector<BrokenCase>& cases() {
       {"MeshNoObj", with_body(R"({"type": "soft", "mesh": "broken.obj"})"), "broken.obj: not an OBJ file"},
       {"CapeNoHuman", with_body(R"({"type": "soft", "cape": {"human": "bob"}})"),
        "bodies[0].cape.human: there is no human collider called \"bob\""},
+      {"LatticeNoPoints", with_body(R"({"type": "soft", "lattice": {"size": [1, 1, 1]}})"),
+       "bodies[0].lattice: the key \"points\" is missing"},
+      {"LatticeFlat", with_body(R"({"type": "soft", "lattice": {"size": [1, 0, 1], "points": [3, 3, 3]}})"),
+       "bodies[0].lattice.size[1]: must be positive [m], got 0"},
+      {"LatticeSizeLength", with_body(R"({"type": "soft", "lattice": {"size": [1, 1], "points": [3, 3, 3]}})"),
+       "bodies[0].lattice.size: must be [x, y, z], got an array of 2"},
+      {"LatticeOneLayer", lattice("", "[3, 3, 1]"), "bodies[0].lattice.points[2]: must be a whole number from 2"},
+      {"LatticeTooMany", lattice("", "[3000, 3000, 3000]"), "bodies[0].lattice.points: must make at most"},
+      {"LatticeLongCells", lattice("", "[3, 3, 5]"),
+       "bodies[0].lattice: lattice: cells must be nearly cubes, got 0.05"},
+      {"LatticeAxis",
+       with_body(
+           R"({"type": "soft", "lattice": {"size": [1, 1, 1], "points": [3, 3, 3], "rotation": {"axis": [0, 0, 0], "angle": 1}}})"),
+       "bodies[0].lattice.rotation.axis: must be a direction"},
+      {"LatticeYoung", lattice(R"("material": {"young": 0})"),
+       "bodies[0].material.young: must be positive [Pa], got 0"},
+      {"LatticePoisson", lattice(R"("material": {"poisson_ratio": 0.5})"),
+       "bodies[0].material.poisson_ratio: must be at least 0.25 and below 0.5, got 0.5"},
+      {"LatticeCloth", lattice(R"("material": {"stretch": 100})"), "bodies[0].material.stretch: unknown key"},
+      {"LatticeFixedMixed", lattice(R"("material": {"mass": 1, "stiffness": 1, "young": 1})"),
+       "bodies[0].material.young: unknown key"},
+      {"LatticeFixedNoMass", lattice(R"("material": {"stiffness": 1})"),
+       "bodies[0].material: the key \"mass\" is missing"},
+      {"LatticePinSide", lattice(R"("pin": ["upper"])"), "bodies[0].pin[0]: must be one of top, bottom, left, right"},
+      {"GridPinFront", grid(R"("pin": ["front"])"), "bodies[0].pin[0]: must be one of top, bottom, left, right"},
+      {"LookUnknown", lattice(R"("look": "stone")"), "bodies[0].look: must be one of cloth, jelly, got \"stone\""},
+      {"LookOnRaw", raw(R"("mass": 1, "look": "jelly")"), "bodies[0].look: needs triangles"},
       {"ColliderType", with_collider(R"("type": "cone")"),
        "colliders[0].type: must be one of half-space, sphere, capsule, box, mesh, lathe, level-set, human, got "
        "\"cone\""},

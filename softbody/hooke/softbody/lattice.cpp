@@ -91,7 +91,8 @@ class Box {
     return std::make_shared<const SpringNetwork>(std::move(network));
   }
 
-  // The six faces. Their diagonals alternate, so that no direction is favoured.
+  // The six faces. Their diagonals go one way, so that almost all points have six neighbours: alternating ones
+  // would show as bumps wherever the surface is subdivided.
   std::vector<Triangle> surface() const {
     std::vector<Triangle> triangles;
     for (std::size_t normal = 0; normal < 3; ++normal) {
@@ -108,10 +109,8 @@ class Box {
             };
             int ring[4] = {corner(0, 0), corner(1, 0), corner(1, 1), corner(0, 1)};
             if (!far) std::swap(ring[1], ring[3]);
-            const int turn = (at[u] + at[v]) % 2;
-            const auto r = [&](int i) { return ring[(i + turn) % 4]; };
-            triangles.push_back({r(0), r(1), r(2)});
-            triangles.push_back({r(0), r(2), r(3)});
+            triangles.push_back({ring[0], ring[1], ring[2]});
+            triangles.push_back({ring[0], ring[2], ring[3]});
           }
       }
     }
@@ -142,6 +141,7 @@ Lattice lattice_from_box(const Vec3& size, const Count& points, const LatticeMat
 
   const Box box(points);
   Lattice lattice;
+  lattice.points = points;
   lattice.positions = box.positions(size, turn);
   lattice.masses.resize(lattice.positions.rows());
   box.each([&](const Count& at) {
@@ -166,8 +166,8 @@ Lattice lattice_from_box(const Vec3& size, const Count& points, const LatticeMat
     return shared * (axes == 1 ? edge[along] : shear * volume * squares / (2 * product));
   });
   lattice.triangles = box.surface();
-  lattice.volume_stiffness = m.young / (3 * (1 - 2 * m.poisson_ratio)) - shear * 5 / 3;
-  if (m.poisson_ratio == 0.25) lattice.volume_stiffness = 0;
+  lattice.cell_stiffness = m.young / (3 * (1 - 2 * m.poisson_ratio)) - shear * 5 / 3;
+  if (m.poisson_ratio == 0.25) lattice.cell_stiffness = 0;
   return lattice;
 }
 
@@ -178,6 +178,7 @@ Lattice lattice_from_box(const Vec3& size, const Count& points, const FixedLatti
   require(m.damping_ratio >= 0, "damping_ratio", "not be negative", m.damping_ratio);
   const Box box(points);
   Lattice lattice;
+  lattice.points = points;
   lattice.positions = box.positions(size, turn);
   lattice.masses = Values<double>::Constant(lattice.positions.rows(), m.mass / double(lattice.positions.rows()));
   lattice.network = box.join(lattice.masses, m.damping_ratio, [&](const Count&, const Count&) { return m.stiffness; });

@@ -13,9 +13,10 @@ struct LatticeMaterial {
   /// Young's modulus: force per area and strain of a bar that is stretched [Pa], > 0. Jelly: 1e3 to
   /// 2e4. More: sags less, wobbles faster, costs steps as its square root.
   double young = 5000;
-  /// Thinning of a stretched bar per lengthening, in [0.25, 0.5). Springs alone have 0.25; above it
-  /// the body as a whole resists changes of its volume. More: bulges where it is pressed.
-  double poisson_ratio = 0.25;
+  /// Thinning of a stretched bar per lengthening, in [0.25, 0.5). Springs alone have 0.25; above it every
+  /// cell resists changes of its volume, and comes back where a blow turned it inside out. More: bulges
+  /// where it is pressed, costs steps.
+  double poisson_ratio = 0.4;
   /// Share of critical damping of each spring; 1 stops a single spring fastest. The body's slow
   /// wobble is damped less, the more so the finer the lattice: as the spacing over its size.
   double damping_ratio = 0.2;
@@ -34,7 +35,8 @@ struct Lattice {
   Values<double> masses;           ///< [kg], (n)
   std::shared_ptr<const SpringNetwork> network;
   std::vector<Triangle> triangles;  ///< the closed surface
-  double volume_stiffness = 0;      ///< [Pa], as VolumeField
+  std::array<int, 3> points{};      ///< along x, y and z
+  double cell_stiffness = 0;        ///< [Pa], as CellVolumeField
 };
 
 /// A box of nx × ny × nz points over `size` around the local origin; x runs fastest: point index =
@@ -63,7 +65,7 @@ struct Lattice {
 /// saved. Source: the moduli are Born and Huang's sums over springs, Σ k l² n n n n / 2V, set equal to
 /// those of an isotropic body.
 ///
-/// Above Poisson's ratio 1/4, μ = E / (2 (1 + ν)), and `volume_stiffness` is what is missing to the
+/// Above Poisson's ratio 1/4, μ = E / (2 (1 + ν)), and `cell_stiffness` is what is missing to the
 /// bulk modulus, E / (3 (1 - 2ν)) - 5 μ / 3.
 /// @param size [m], > 0; points >= 2 a side; cells must be nearly cubes, so that no k above is negative:
 ///        the third of two equal sides may be 0.71 to 1.22 times as long as they are

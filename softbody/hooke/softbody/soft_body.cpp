@@ -1,5 +1,6 @@
 #include <hooke/softbody/soft_body.hpp>
 
+#include <hooke/softbody/cell_volume_field.hpp>
 #include <hooke/softbody/spring_field.hpp>
 #include <hooke/softbody/volume_field.hpp>
 
@@ -44,6 +45,8 @@ std::unique_ptr<Body> make(const SoftBodySettings& s) {
         std::make_unique<SpringField<S>>(s.network, body->state().position, s.precision == Precision::DoubleFloat));
   if (s.volume_stiffness != 0)
     body->add_field(std::make_unique<VolumeField<S>>(s.volume_stiffness, s.triangles, body->state().position));
+  if (s.cell_stiffness != 0)
+    body->add_field(std::make_unique<CellVolumeField<S>>(s.cell_stiffness, s.cells, body->state().position));
   if (s.wind) body->add_field(std::make_unique<WindField<S>>(*s.wind, s.triangles, n));
   if (s.linear_drag != 0) body->add_field(std::make_unique<LinearDrag<S>>(s.linear_drag));
   if (s.quadratic_drag != 0) body->add_field(std::make_unique<QuadraticDrag<S>>(s.quadratic_drag));
@@ -96,7 +99,8 @@ SoftBodySettings settings_of(const Cloth& cloth) { return taken_from(cloth); }
 
 SoftBodySettings settings_of(const Lattice& lattice) {
   SoftBodySettings settings = taken_from(lattice);
-  settings.volume_stiffness = lattice.volume_stiffness;
+  settings.cells = lattice.points;
+  settings.cell_stiffness = lattice.cell_stiffness;
   return settings;
 }
 

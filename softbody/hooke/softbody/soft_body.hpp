@@ -38,6 +38,8 @@ struct SoftBodySettings {
   std::vector<Triangle> triangles;               ///< for wind and drawing
   std::vector<Index> pins;                       ///< held from the start
   double volume_stiffness = 0;                   ///< of what the triangles enclose [Pa], as VolumeField; 0: none
+  std::array<int, 3> cells{};                    ///< points of a lattice along x, y and z
+  double cell_stiffness = 0;                     ///< of each of its cells [Pa], as CellVolumeField; 0: none
   std::optional<Wind> wind;                      ///< absent: no air at all
   double linear_drag = 0;                        ///< on every point [N·s/m]
   double quadratic_drag = 0;                     ///< on every point [N·s²/m²]
@@ -51,7 +53,7 @@ Precision resolved_precision(const SoftBodySettings& settings);
 
 /// Takes points, masses, springs and triangles from a cloth.
 SoftBodySettings settings_of(const Cloth& cloth);
-/// The same from a lattice, with its volume stiffness.
+/// The same from a lattice, with the stiffness of its cells.
 SoftBodySettings settings_of(const Lattice& lattice);
 
 /// Builds the body. A soft body is a PointBody with a SpringField and, where asked for, volume, wind

@@ -134,6 +134,16 @@ typename ForceField<S>::Rates VolumeField<S>::rate_bounds(const Points<S>& x, co
   return {stiffness_ / start_volume_ * squares + std::abs(pressure(x)) * turning, 0};
 }
 
+template <class S>
+void VolumeField<S>::describe(Blueprint& out) const {
+  CheckpointWriter surface;
+  for (const Triangle& triangle : triangles_)
+    for (const int corner : triangle) surface.add(corner);
+  out.add("volume stiffness", stiffness_);
+  out.add("volume", start_volume_);
+  out.add_sum("volume's surface", surface);
+}
+
 template class VolumeField<float>;
 template class VolumeField<double>;
 

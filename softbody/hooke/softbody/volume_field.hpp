@@ -23,6 +23,7 @@ class VolumeField final : public ForceField<S> {
   double volume(const Points<S>& x) const;
 
   bool uses_velocity() const override { return false; }
+  bool passive() const override { return true; }
   void add_force(const Points<S>& x, const Points<S>& v, double t, Points<S>& f) const override;
   /// The change of pressure, κ/V₀ ∇V ∇Vᵀ, is never negative; `safe` leaves out the turning of the surface.
   void add_stiffness_times(const Points<S>& x, const Points<S>& d, bool safe, Points<S>& out) const override;
@@ -30,6 +31,7 @@ class VolumeField final : public ForceField<S> {
   /// κ/V₀ Σ w |∇V|², exact for the pressure's change, and the largest row of the rest.
   typename ForceField<S>::Rates rate_bounds(const Points<S>& x, const Points<S>& v,
                                             const Values<S>& inverse_mass) const override;
+  void describe(Blueprint& out) const override;
 
  private:
   double pressure(const Points<S>& x) const;  // [Pa], of compression
