@@ -54,6 +54,8 @@ StepReport advance(World& world, double to, RunResult& result) {
   result.wall += wall_seconds() - wall;
   result.cpu += cpu_seconds() - cpu;
   result.simulated += world.time() - from;
+  for (const StepReport& warning : world.take_warnings())
+    std::fprintf(stderr, "\nhooke: warning: %s\n", warning.text().c_str());
   return report;
 }
 

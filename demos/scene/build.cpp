@@ -246,6 +246,7 @@ class Builder {
     settings.motion.tolerance = description.solver.tolerance;
     settings.motion.iterations = description.solver.iterations;
     settings.motion.compensated = description.solver.compensated;
+    settings.motion.retries = description.solver.retries;
     settings.motion.method = &method_of(description.solver.method);
     settings.wanted_error = description.solver.wanted_error;
     settings.precision = description.solver.precision;

@@ -70,6 +70,7 @@ struct Solver {
   double wanted_error = 0;  ///< of filtered-leapfrog [m], as SoftBodySettings::wanted_error; 0: none
   softbody::Precision precision = softbody::Precision::Automatic;  // particles: float
   bool compensated = true;                                         ///< as MotionSettings
+  int retries = 0;                                                 ///< as MotionSettings
 };
 
 /// What a soft body's surface is drawn as.

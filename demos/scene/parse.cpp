@@ -254,6 +254,7 @@ Solver read_solver(const Object& object) {
     solver.iterations = int(iterations->whole(1, 1000));
   }
   if (object.has("compensated")) solver.compensated = object["compensated"].truth();
+  if (const auto retries = object.find("retries")) solver.retries = int(retries->whole(0, 20));
   if (const auto precision = object.find("precision"))
     solver.precision = softbody::precision_named(precision->choice({"float", "double", "double-float"}));
   return solver;

@@ -150,7 +150,7 @@ const KeyTable& key_table() {
       {"kind", {"name", "look", "color", "size", "intensity", "opacity"}},
       {"temperature", {"temperature"}},
       {"particle_solver", {"method", "dt", "precision"}},
-      {"solver", {"error", "method", "dt", "wanted_error", "iterations", "precision", "compensated"}},
+      {"solver", {"error", "method", "dt", "wanted_error", "iterations", "precision", "compensated", "retries"}},
       {"half_space", {"type", "name", "normal", "offset", "friction", "restitution"}},
       {"sphere", {"type", "name", "center", "radius", "motion", "friction", "restitution", "color", "look"}},
       {"capsule", {"type", "name", "a", "b", "radius", "motion", "friction", "restitution", "color", "look"}},
