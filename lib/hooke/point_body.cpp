@@ -492,6 +492,7 @@ std::string PointBody<S>::step_advice() const {
 // tick_ with the present number of substeps; where it fails, the state is that of before.
 template <class S>
 StepReport PointBody<S>::try_tick() {
+  const std::int64_t unfinished = integrator_.work().unfinished;
   const SolveResult solve = run_tick();
   // What is not finite anywhere is not finite in the velocities, and so in their energy.
   const auto& v = points_.velocity;
@@ -499,6 +500,14 @@ StepReport PointBody<S>::try_tick() {
       0.5 * double((points_.mass * (v.col(0).square() + v.col(1).square() + v.col(2).square())).sum());
   const bool good = std::isfinite(kinetic) || (points_.position.allFinite() && v.allFinite());
   if (!good || !solve.converged) return explain(good);
+  if (integrator_.work().unfinished > unfinished && !warned_of_solve_) {
+    StepReport report;
+    report.status = StepReport::Status::NotConverged;
+    report.body = name();
+    report.time = tick_.start;
+    report.advice = "its step was kept, which brings it nearer but not all the way; " + step_advice();
+    warn(std::move(report), warned_of_solve_);
+  }
   if (StepReport report = watch_energy(kinetic); !report.good()) return report;
   rest(kinetic);
   return {};
