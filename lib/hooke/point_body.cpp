@@ -500,13 +500,13 @@ StepReport PointBody<S>::try_tick() {
       0.5 * double((points_.mass * (v.col(0).square() + v.col(1).square() + v.col(2).square())).sum());
   const bool good = std::isfinite(kinetic) || (points_.position.allFinite() && v.allFinite());
   if (!good || !solve.converged) return explain(good);
-  if (integrator_.work().unfinished > unfinished && !warned_of_solve_) {
+  if (integrator_.work().unfinished > unfinished && !warned_of_step_) {
     StepReport report;
     report.status = StepReport::Status::NotConverged;
     report.body = name();
     report.time = tick_.start;
     report.advice = "its step was kept, which brings it nearer but not all the way; " + step_advice();
-    warn(std::move(report), warned_of_solve_);
+    warn(std::move(report), warned_of_step_);
   }
   if (StepReport report = watch_energy(kinetic); !report.good()) return report;
   rest(kinetic);
@@ -690,6 +690,7 @@ void PointBody<S>::check_step() {
     step_checked_ = tick_.start;
     checked_limit_ = stable_step();
   }
+  if (!std::isfinite(checked_limit_)) return;
   if (h <= checked_limit_) {
     warned_of_step_ = false;
     return;

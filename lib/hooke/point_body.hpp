@@ -205,7 +205,7 @@ class PointBody : public Body, protected Dynamics<S> {
 
   EnergyWatch energy_watch_;
   std::vector<StepReport> warnings_;
-  bool warned_of_energy_ = false, warned_of_step_ = false, warned_of_solve_ = false;
+  bool warned_of_energy_ = false, warned_of_step_ = false;
   double step_checked_ = -1, checked_limit_ = 0;
 
   // While a failed tick is run once more to find out what went wrong.
