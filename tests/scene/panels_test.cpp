@@ -2,6 +2,8 @@
 #include <hooke/error.hpp>
 #include <hooke/point_body.hpp>
 #include <io/temporary_folder.hpp>
+#include <scene/figures.hpp>
+#include <scene/library.hpp>
 #include <scene/panels.hpp>
 #include <scene/scene.hpp>
 
@@ -65,6 +67,16 @@ TEST(Panels, ThatComeWithHookeCanBeBuilt) {
     EXPECT_FALSE(panels.title.empty()) << name;
     for (const Panel& panel : panels.panels) EXPECT_NO_THROW(build(panel.scene)) << name << " " << panel.title;
   }
+}
+
+// All six cubes lie still by the end of the film, none crushed and none in the stone.
+TEST(JellyScene, EndsAtRest) {
+  Scene scene = build(find_scene("jelly"));
+  for (int i = 0; i < 6 * 60; ++i) ASSERT_TRUE(scene.world.update(1 / 60.0).good());
+  ASSERT_EQ(scene.bodies.size(), 6u);
+  for (const SceneBody& body : scene.bodies) EXPECT_TRUE(body.body->asleep()) << body.body->name();
+  EXPECT_LT(worst_stretch(scene), 0.5);
+  EXPECT_LT(worst_penetration(scene), 1e-5);
 }
 
 const PointBody<float>& only_body(const Scene& scene) {
