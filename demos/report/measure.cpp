@@ -115,7 +115,8 @@ Outcome run(const StandardScene& scene, const Solver& solver, const Scales& scal
     const MotionFacts facts = body->motion_facts();
     out.row.evaluations += double(facts.evaluations + facts.products);
   }
-  if (report.status == StepReport::Status::NotFinite) out.row.status = "blow-up";
+  if (report.status == StepReport::Status::NotFinite || report.status == StepReport::Status::EnergyGrew)
+    out.row.status = "blow-up";
   if (report.status == StepReport::Status::NotConverged) out.row.status = "not converged";
   return out;
 }

@@ -28,7 +28,11 @@ SceneDescription driven_sheet() {
   return d;
 }
 
-Vec3 rounded(const Vec3& x, bool single) { return single ? Vec3(float(x.x()), float(x.y()), float(x.z())) : x; }
+Vec3 rounded(const Vec3& x, bool single) {
+  if (!single) return x;
+  const Eigen::Vector3f short_of = x.cast<float>();
+  return short_of.cast<double>();
+}
 
 Case variable_frames() {
   Case hard;

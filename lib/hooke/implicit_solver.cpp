@@ -400,7 +400,9 @@ SolveResult ImplicitSolver<S>::solve(const Implicit& scheme, Dynamics<S>& dynami
   const double h = scheme.theta * whole;
   const Step step{dynamics, x, v, t, h, work};
   const double tolerance = tolerance_of<S>(scheme);
-  find_planes(step, whole);
+  // One linear solve cannot know the pressure that friction needs: its contacts come afterwards.
+  planes_.clear(), contacts_.clear(), held_.clear();
+  if (!scheme.linearised) find_planes(step, whole);
   u_ = v;
   clip(u_);
   SolveResult result;

@@ -170,7 +170,7 @@ class PointBody : public Body, protected Dynamics<S> {
   bool balanced();
   double unbalanced(const Points<S>& x, Points<S>& left);
   bool alone() const;
-  double total_energy() const;
+  double kept_energy();
   void begin_energy_watch();
   StepReport watch_energy(double kinetic);
   void check_step();

@@ -210,6 +210,7 @@ class XpbdBody final : public PointBody<S> {
   void lay_out_springs(const SpringNetwork& network);
   void prepare_gains(double h);
   void begin(double t, S h);
+  void soften_drag(S h);
   void find_planes(double t, S h);
   void push_by_carried();
   void sweep();
@@ -226,7 +227,8 @@ class XpbdBody final : public PointBody<S> {
   std::vector<Record<S>> start_, way_;
   Memory memory_, before_;
   Points<S> low_, before_low_;  // what positions are rounded by
-  Points<S> from_, acceleration_, still_force_, pin_x_, pin_v_;
+  Points<S> from_, acceleration_, still_force_, from_damping_, pin_x_, pin_v_;
+  Values<S> drag_;
   bool moving_pins_ = false;
   std::vector<ContactPlane<S>> planes_;
   std::vector<Contact<S>> contacts_;
@@ -277,12 +279,35 @@ void XpbdBody<S>::prepare_gains(double h) {
   }
 }
 
+// Drag acts explicitly. Where it could stop a point within the substep it is held back as backward Euler would, each
+// point by itself: a / (1 + h d w), d the largest drag of a common motion along an axis.
+template <class S>
+void XpbdBody<S>::soften_drag(S h) {
+  const Index n = points_.size();
+  still_force_.setZero(n, 3);
+  drag_.setZero(n);
+  for (int k = 0; k < 3; ++k) {
+    from_damping_.setZero(n, 3);
+    still_force_.setZero(n, 3);
+    still_force_.col(k).setConstant(1 / h);
+    this->add_implicit_times(points_.position, points_.velocity, h, true, still_force_, from_damping_);
+    drag_ = drag_.max(from_damping_.square().rowwise().sum().sqrt());
+  }
+  // Gravity is no drag.
+  for (int k = 0; k < 3; ++k) {
+    const S g = S(tick_.gravity[k]);
+    acceleration_.col(k) = (points_.inverse_mass > S(0))
+                               .select(g + (acceleration_.col(k) - g) / (1 + h * drag_ * points_.inverse_mass), S(0));
+  }
+}
+
 // Where points would go without springs and contacts.
 template <class S>
 void XpbdBody<S>::begin(double t, S h) {
   const Points<S>&x = points_.position, &v = points_.velocity;
   const bool forces = this->other_forces();
   if (forces) this->acceleration(x, v, t, acceleration_);
+  if (forces && this->uses_velocity()) soften_drag(h);
   S g[3];
   for (int k = 0; k < 3; ++k) g[k] = h * S(tick_.gravity[k]);
   for (Index i = 0; i < x.rows(); ++i) {
