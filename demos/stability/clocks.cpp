@@ -4,6 +4,8 @@
 #include "scenes.hpp"
 #include "trial.hpp"
 
+#include <hooke/point_body.hpp>
+
 #include <numbers>
 #include <random>
 
@@ -28,10 +30,12 @@ SceneDescription driven_sheet() {
   return d;
 }
 
-Vec3 rounded(const Vec3& x, bool single) {
+// Where a body in float can hold a point: its places are relative to an origin of its own.
+Vec3 rounded(const Body& body, const Vec3& x) {
+  const auto* single = dynamic_cast<const PointBody<float>*>(&body);
   if (!single) return x;
-  const Eigen::Vector3f short_of = x.cast<float>();
-  return short_of.cast<double>();
+  const Eigen::Vector3f place = (x - single->state().origin).cast<float>();
+  return single->state().origin + place.cast<double>();
 }
 
 Case variable_frames() {
@@ -106,7 +110,7 @@ Case moving_pins() {
       if (!watch.run(world.time() + 1.0 / 60)) return;
       for (Index i = 0; i < 8; ++i) {
         const Vec3 target = Vec3(start.row(i).matrix().transpose()) + Vec3(10, 0, 0);
-        off = std::max(off, (Vec3(body.positions().row(i).matrix().transpose()) - rounded(target, single)).norm());
+        off = std::max(off, (Vec3(body.positions().row(i).matrix().transpose()) - rounded(body, target)).norm());
       }
       watch.run(1);
     } else {
@@ -121,7 +125,7 @@ Case moving_pins() {
       watch.look = [&] {
         for (Index i = 0; i < 8; ++i) {
           const Vec3 target = place(world.time(), i);
-          off = std::max(off, (Vec3(body.positions().row(i).matrix().transpose()) - rounded(target, single)).norm());
+          off = std::max(off, (Vec3(body.positions().row(i).matrix().transpose()) - rounded(body, target)).norm());
         }
       };
       watch.run(1);
