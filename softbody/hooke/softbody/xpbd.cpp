@@ -150,7 +150,7 @@ class XpbdBody final : public PointBody<S> {
   SolveResult substep(double t, double h) override {
     const bool touching = this->collides();
     if (touching || this->prescribes()) from_ = points_.position;
-    begin(t, S(h));
+    begin(t, h);
     planes_.clear(), contacts_.clear();
     if (touching) find_planes(t, S(h));
     prepare_gains(h);
@@ -209,7 +209,7 @@ class XpbdBody final : public PointBody<S> {
 
   void lay_out_springs(const SpringNetwork& network);
   void prepare_gains(double h);
-  void begin(double t, S h);
+  void begin(double t, double step);
   void soften_drag(S h);
   void find_planes(double t, S h);
   void push_by_carried();
@@ -303,7 +303,8 @@ void XpbdBody<S>::soften_drag(S h) {
 
 // Where points would go without springs and contacts.
 template <class S>
-void XpbdBody<S>::begin(double t, S h) {
+void XpbdBody<S>::begin(double t, double step) {
+  const S h = S(step);
   const Points<S>&x = points_.position, &v = points_.velocity;
   const bool forces = this->other_forces();
   if (forces) this->acceleration(x, v, t, acceleration_);
@@ -323,7 +324,7 @@ void XpbdBody<S>::begin(double t, S h) {
   moving_pins_ = this->prescribes();
   if (!moving_pins_) return;
   pin_x_ = x, pin_v_ = v;
-  this->prescribe(t, from_, t + double(h), pin_x_, pin_v_);
+  this->prescribe(t, from_, t + step, pin_x_, pin_v_);
   for (Index i = 0; i < x.rows(); ++i)
     if (points_.inverse_mass[i] == 0) {
       Record<S>& way = way_[std::size_t(i)];
