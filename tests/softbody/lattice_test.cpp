@@ -9,6 +9,7 @@
 #include <gmock/gmock.h>
 #include <Eigen/Geometry>
 
+#include <limits>
 #include <map>
 
 namespace hooke::test {
