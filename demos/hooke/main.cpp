@@ -169,7 +169,8 @@ int dispatch(int argc, char** argv) {
   if (stability_command->parsed()) return stability(a.stability);
   if (validate_command->parsed()) return validate(a.validate_scene);
   if (list_command->parsed() || a.list) return list();
-  return tell(kBadInput, "a command is needed: simulate, render, panels, validate, report, stability or list (hooke --help)");
+  return tell(kBadInput,
+              "a command is needed: simulate, render, panels, validate, report, stability or list (hooke --help)");
 }
 
 }  // namespace
