@@ -51,7 +51,7 @@ StandardScene particle_scene(bool quadratic) {
     World world(1);
     world.set_gravity({0, -kGravity, 0});
     world.add(solver.precision != softbody::Precision::Double ? system_of<float>(solver, quadratic)
-                                                             : system_of<double>(solver, quadratic));
+                                                              : system_of<double>(solver, quadratic));
     return world;
   };
   return scene;
