@@ -179,25 +179,8 @@ HWY_INLINE void kick(const Kick<S>& kick, Group<Lanes<S>>& a, Group<Lanes<S>>& b
   a.v2 = hn::Add(a.v2, hn::MulAdd(a.v2, gain, add2)), b.v2 = hn::Add(b.v2, hn::MulAdd(b.v2, gain, add2));
 }
 
-// Returns the least that remains.
-template <class S>
-HWY_INLINE S age(const Tile<S>& tile, S seconds) {
-  const Lanes<S> d;
-  const Index lanes = Index(hn::Lanes(d));
-  const auto most = hn::Set(d, std::numeric_limits<S>::max()), passed = hn::Set(d, seconds);
-  auto least = most;
-  for (Index i = 0; i < tile.count; i += lanes) {
-    auto left = hn::Sub(hn::LoadU(d, tile.remaining + i), passed);
-    hn::StoreU(left, d, tile.remaining + i);
-    if (HWY_UNLIKELY(tile.count - i < lanes))
-      left = hn::IfThenElse(hn::FirstN(d, std::size_t(tile.count - i)), left, most);
-    least = hn::Min(least, left);
-  }
-  return hn::GetLane(hn::MinOfLanes(d, least));
-}
-
 template <Planes kPlanes, class S>
-Landing fly_lanes(const Tile<S>& tile, const Flight<S>& flight) {
+bool fly_lanes(const Tile<S>& tile, const Flight<S>& flight) {
   const Lanes<S> d;
   const Index lanes = Index(hn::Lanes(d));
   const int legs = int(flight.legs.size());
@@ -206,7 +189,6 @@ Landing fly_lanes(const Tile<S>& tile, const Flight<S>& flight) {
   auto sum = hn::Zero(d);
   S *const px = tile.x[0], *const py = tile.x[1], *const pz = tile.x[2];
   S *const qx = tile.v[0], *const qy = tile.v[1], *const qz = tile.v[2];
-  const bool ages = tile.remaining && flight.ageing != 0;
   const auto load = [&](Index i) HWY_ATTR {
     return Group<Lanes<S>>{hn::LoadU(d, px + i), hn::LoadU(d, py + i), hn::LoadU(d, pz + i),
                            hn::LoadU(d, qx + i), hn::LoadU(d, qy + i), hn::LoadU(d, qz + i)};
@@ -222,8 +204,7 @@ Landing fly_lanes(const Tile<S>& tile, const Flight<S>& flight) {
   };
   for (Index i = 0; i < tile.count; i += 2 * lanes) {
     Group<Lanes<S>> a = load(i), b = load(i + lanes);
-    // Seven streams are more than the processor's own prefetchers follow well.
-    if (ages) __builtin_prefetch(tile.remaining + i, 1);
+    // Six streams are more than the processor's own prefetchers follow well.
     for (int k = 0; k < 3; ++k)
       __builtin_prefetch(tile.x[k] + i + kAhead, 1), __builtin_prefetch(tile.v[k] + i + kAhead, 1);
     const Plane<S>* planes = flight.planes;
@@ -238,33 +219,28 @@ Landing fly_lanes(const Tile<S>& tile, const Flight<S>& flight) {
     if (flight.settles) meet_planes<kPlanes, S>(tile, flight, -1, i, last_planes, a, b);
     store(i, a), store(i + lanes, b);
   }
-  const bool died = ages && age(tile, flight.ageing) <= 0;
-  return {died, hn::GetLane(hn::SumOfLanes(d, sum)) == 0};
+  return hn::GetLane(hn::SumOfLanes(d, sum)) == 0;
 }
 
 // One step a tick is bound by memory: here all constants stay in registers, and one vector at a time is enough.
 template <Planes kPlanes, class S>
-Landing fly_once(const Tile<S>& tile, const Flight<S>& flight) {
+bool fly_once(const Tile<S>& tile, const Flight<S>& flight) {
   const Lanes<S> d;
   const Index lanes = Index(hn::Lanes(d));
   const Kick<S>&k = flight.legs[0].kick, &e = *flight.last;
   const auto gain = hn::Set(d, k.gain), end_gain = hn::Set(d, e.gain), drift = hn::Set(d, flight.legs[0].drift);
   const auto add0 = hn::Set(d, k.add[0]), add1 = hn::Set(d, k.add[1]), add2 = hn::Set(d, k.add[2]);
   const auto end0 = hn::Set(d, e.add[0]), end1 = hn::Set(d, e.add[1]), end2 = hn::Set(d, e.add[2]);
-  const bool ages = tile.remaining && flight.ageing != 0;
-  const auto passed = hn::Set(d, flight.ageing), most = hn::Set(d, std::numeric_limits<S>::max());
   const S offset = kPlanes == Planes::Floor ? flight.planes->offset : S(0);
   const S near = kPlanes == Planes::Floor ? flight.planes->near : S(0);
   const auto touch = hn::Set(d, offset + near);
   S *const px = tile.x[0], *const py = tile.x[1], *const pz = tile.x[2];
   S *const qx = tile.v[0], *const qy = tile.v[1], *const qz = tile.v[2];
-  S* const life = tile.remaining;
-  auto sum = hn::Zero(d), least = most;
+  auto sum = hn::Zero(d);
   for (Index i = 0; i < tile.count; i += lanes) {
     Group<Lanes<S>> g{hn::LoadU(d, px + i), hn::LoadU(d, py + i), hn::LoadU(d, pz + i),
                       hn::LoadU(d, qx + i), hn::LoadU(d, qy + i), hn::LoadU(d, qz + i)};
     if ((std::size_t(i) * sizeof(S)) % 64 == 0) {
-      if (ages) __builtin_prefetch(life + i + kAhead, 1);
       __builtin_prefetch(px + i + kAhead, 1), __builtin_prefetch(py + i + kAhead, 1),
           __builtin_prefetch(pz + i + kAhead, 1);
       __builtin_prefetch(qx + i + kAhead, 1), __builtin_prefetch(qy + i + kAhead, 1),
@@ -289,19 +265,12 @@ Landing fly_once(const Tile<S>& tile, const Flight<S>& flight) {
     if (HWY_UNLIKELY(tile.count - i < lanes))
       part = hn::IfThenElseZero(hn::FirstN(d, std::size_t(tile.count - i)), part);
     sum = hn::MulAdd(part, hn::Zero(d), sum);
-    if (ages) {
-      auto left = hn::Sub(hn::LoadU(d, life + i), passed);
-      hn::StoreU(left, d, life + i);
-      if (HWY_UNLIKELY(tile.count - i < lanes))
-        left = hn::IfThenElse(hn::FirstN(d, std::size_t(tile.count - i)), left, most);
-      least = hn::Min(least, left);
-    }
   }
-  return {hn::GetLane(hn::MinOfLanes(d, least)) <= 0, hn::GetLane(hn::SumOfLanes(d, sum)) == 0};
+  return hn::GetLane(hn::SumOfLanes(d, sum)) == 0;
 }
 
 template <class S>
-Landing fly_any(const Tile<S>& tile, const Flight<S>& flight) {
+bool fly_any(const Tile<S>& tile, const Flight<S>& flight) {
   const bool once = flight.legs.size() == 1 && flight.last,
              floor = flight.plane_count == 1 && flight.planes->normal[1] == 1 && flight.planes->normal[0] == 0 &&
                      flight.planes->normal[2] == 0;
@@ -345,8 +314,8 @@ void kick_lanes(const Tile<S>& tile, const Kick<S>& kick, const S* const a[3], S
   }
 }
 
-Landing fly_float(const Tile<float>& t, const Flight<float>& f) { return fly_any(t, f); }
-Landing fly_double(const Tile<double>& t, const Flight<double>& f) { return fly_any(t, f); }
+bool fly_float(const Tile<float>& t, const Flight<float>& f) { return fly_any(t, f); }
+bool fly_double(const Tile<double>& t, const Flight<double>& f) { return fly_any(t, f); }
 void reflect_float(const Tile<float>& t, const Flight<float>& f) { reflect_lanes(t, f); }
 void reflect_double(const Tile<double>& t, const Flight<double>& f) { reflect_lanes(t, f); }
 void kick_float(const Tile<float>& t, const Kick<float>& k, const float* const a[3], float s) {
@@ -369,10 +338,8 @@ HWY_EXPORT(reflect_double);
 HWY_EXPORT(kick_float);
 HWY_EXPORT(kick_double);
 
-Landing fly(const Tile<float>& tile, const Flight<float>& flight) {
-  return HWY_DYNAMIC_DISPATCH(fly_float)(tile, flight);
-}
-Landing fly(const Tile<double>& tile, const Flight<double>& flight) {
+bool fly(const Tile<float>& tile, const Flight<float>& flight) { return HWY_DYNAMIC_DISPATCH(fly_float)(tile, flight); }
+bool fly(const Tile<double>& tile, const Flight<double>& flight) {
   return HWY_DYNAMIC_DISPATCH(fly_double)(tile, flight);
 }
 void reflect(const Tile<float>& tile, const Flight<float>& flight) {

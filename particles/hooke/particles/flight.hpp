@@ -48,19 +48,14 @@ struct Flight {
   bool settles = false;              ///< in the end, what presses slowly into a plane stops there
   const Plane<S>* planes = nullptr;  ///< plane_count a leg
   Index plane_count = 0;
-  S ageing = 0;                         ///< taken from what remains of life [s]
   const S* skip = nullptr;              ///< planes let particles alone whose number here is not positive
   std::vector<Hit<S>>* hits = nullptr;  ///< where to tell impacts, or null
   int first_leg = 0;                    ///< number of legs[0], for hits
 };
 
-struct Landing {
-  bool died = false;   ///< somebody's life is over
-  bool finite = true;  ///< all positions and velocities
-};
-
-Landing fly(const Tile<float>& tile, const Flight<float>& flight);
-Landing fly(const Tile<double>& tile, const Flight<double>& flight);
+/// @return whether all positions and velocities are finite in the end
+bool fly(const Tile<float>& tile, const Flight<float>& flight);
+bool fly(const Tile<double>& tile, const Flight<double>& flight);
 
 /// Planes alone, those of the first leg, after a drift that did not look at them.
 void reflect(const Tile<float>& tile, const Flight<float>& flight);

@@ -266,7 +266,6 @@ void FlowDrag<S>::add_acceleration(const Tile<S>& tile, Index, const Vec3& origi
     for (int k = 0; k < 3; ++k) part.x[k] += first, part.v[k] += first, std::fill_n(u[k], n, S(0));
     if (part.serial) part.serial += first;
     if (part.inverse_mass) part.inverse_mass += first;
-    if (part.remaining) part.remaining += first;
     S* const out[3] = {u[0], u[1], u[2]};
     flow_->add_velocity(part, origin, t, out);
     for (int k = 0; k < 3; ++k)

@@ -17,6 +17,9 @@ namespace {
 // Tiles that a thread takes at a time: long enough a run for the processor to read ahead.
 constexpr Index kTilesAtOnce = 16;
 
+// A life that ends with the tick but for rounding does.
+double last_moment(const Tick& tick) { return tick.end + 1e-9 * (tick.end - tick.start); }
+
 template <class S>
 Vec3 row(const Points<S>& p, Index i) {
   return p.row(i).matrix().transpose().template cast<double>();
@@ -78,8 +81,8 @@ void check_settings(const ParticleSettings& s) {
 template <class S>
 struct ParticleSystem<S>::Particle {
   Vec3 position, velocity, previous_position, previous_velocity;
-  S remaining = 0, previous_remaining = 0, inverse_mass = 1;
-  double lifetime = 0;
+  S inverse_mass = 1;
+  double death = 0, lifetime = 0;
   float size = 0;
   std::uint64_t serial = 0;
   std::uint32_t slot = 0;
@@ -124,7 +127,6 @@ struct ParticleSystem<S>::Worker {
   std::vector<Hit<S>> hits;
   std::vector<Event> events;
   bool finite = true;
-  std::vector<Index> dying;  // tiles in which somebody's life is over
   Points<S> x, v;
   std::unique_ptr<Integrator<S>> integrator;
 
@@ -132,7 +134,7 @@ struct ParticleSystem<S>::Worker {
     const std::size_t each = std::size_t(tile) + std::size_t(Tile<S>::kLanes);
     memory.assign(12 * each, S(0));
     marks.assign(each, S(1));
-    hits.reserve(4 * each), events.reserve(4 * each), dying.reserve(64);
+    hits.reserve(4 * each), events.reserve(4 * each);
     S* at = memory.data();
     for (auto* arrays : {a, predicted, x0, v0})
       for (int k = 0; k < 3; ++k, at += each) arrays[k] = at;
@@ -204,6 +206,7 @@ ParticleSystem<S>::ParticleSystem(ParticleSettings settings) : Body(settings.nam
   position_.setZero(padded_, 3);
   velocity_.setZero(padded_, 3);
   if (settings_.keeps_previous) previous_position_.setZero(padded_, 3), previous_velocity_.setZero(padded_, 3);
+  deaths_ = Deaths(n);
   lifetime_.assign(std::size_t(n), 0);
   size_.assign(std::size_t(n), 0);
   serial_.assign(std::size_t(padded_), 0);
@@ -232,14 +235,6 @@ void ParticleSystem<S>::add_force(std::unique_ptr<Force<S>> force) {
   forces_.push_back(std::move(force));
 }
 
-// From now on somebody dies of age.
-template <class S>
-void ParticleSystem<S>::start_ageing() {
-  if (remaining_.size() > 0) return;
-  remaining_.setConstant(padded_, std::numeric_limits<S>::max());
-  if (settings_.keeps_previous) previous_remaining_ = remaining_;
-}
-
 // From now on masses differ.
 template <class S>
 void ParticleSystem<S>::start_weighing() {
@@ -256,7 +251,6 @@ void ParticleSystem<S>::add_emitter(EmitterSettings emitter) {
   const EmitterSettings& e = made.settings();
   if (!has_mass_ && emitters_.empty() && count_ == 0) same_mass_ = e.mass.least;
   if (e.mass.least != same_mass_ || e.mass.most != same_mass_) start_weighing();
-  if (std::isfinite(e.lifetime.least)) start_ageing();
   emitters_.push_back(std::move(made));
 }
 
@@ -286,7 +280,6 @@ void ParticleSystem<S>::add_sub_emitter(SubEmitterSettings sub) {
   wants_births_ |= sub.on == SubEmitterSettings::On::Birth;
   wants_deaths_ |= sub.on == SubEmitterSettings::On::Death;
   wants_impacts_ |= sub.on == SubEmitterSettings::On::Impact;
-  if (std::isfinite(sub.lifetime.least)) start_ageing();
   if (sub.mass != same_mass_ && (!emitters_.empty() || count_ > 0)) start_weighing();
   sub_random_.emplace_back(Random(settings_.seed).bits(sub.seed, ~std::uint64_t(sub_emitters_.size())));
   sub_emitters_.push_back(sub);
@@ -306,13 +299,10 @@ typename ParticleSystem<S>::Particle ParticleSystem<S>::get(Index i) const {
   const std::size_t at = std::size_t(i);
   Particle p;
   p.inverse_mass = S(1 / same_mass_);
-  p.remaining = p.previous_remaining = std::numeric_limits<S>::max();
   p.position = row(position_, i), p.velocity = row(velocity_, i);
-  if (settings_.keeps_previous) {
+  if (settings_.keeps_previous)
     p.previous_position = row(previous_position_, i), p.previous_velocity = row(previous_velocity_, i);
-    if (remaining_.size() > 0) p.previous_remaining = previous_remaining_[i];
-  }
-  if (remaining_.size() > 0) p.remaining = remaining_[i];
+  p.death = deaths_[i];
   if (has_mass_) p.inverse_mass = inverse_mass_[i];
   p.lifetime = lifetime_[at], p.size = size_[at], p.serial = serial_[at], p.slot = slot_[at], p.kind = kind_[at];
   p.birth_place = row(birth_place_, i);
@@ -323,11 +313,9 @@ template <class S>
 void ParticleSystem<S>::put(Index i, const Particle& p) {
   const std::size_t at = std::size_t(i);
   set_row(position_, i, p.position), set_row(velocity_, i, p.velocity);
-  if (settings_.keeps_previous) {
+  if (settings_.keeps_previous)
     set_row(previous_position_, i, p.previous_position), set_row(previous_velocity_, i, p.previous_velocity);
-    if (remaining_.size() > 0) previous_remaining_[i] = p.previous_remaining;
-  }
-  if (remaining_.size() > 0) remaining_[i] = p.remaining;
+  deaths_.set(i, p.death);
   if (has_mass_) inverse_mass_[i] = p.inverse_mass;
   lifetime_[at] = p.lifetime, size_[at] = p.size, serial_[at] = p.serial, slot_[at] = p.slot, kind_[at] = p.kind;
   set_row(birth_place_, i, p.birth_place);
@@ -336,7 +324,7 @@ void ParticleSystem<S>::put(Index i, const Particle& p) {
 
 // `tick`: the one within which it is born and flies on; null: it stays where it is born.
 template <class S>
-bool ParticleSystem<S>::append(const Birth& birth, double time_now, const Tick* tick) {
+bool ParticleSystem<S>::append(const Birth& birth, const Tick* tick) {
   if (count_ >= settings_.capacity) {
     ++counts_.refused;
     return false;
@@ -347,14 +335,12 @@ bool ParticleSystem<S>::append(const Birth& birth, double time_now, const Tick* 
     else
       start_weighing();
   }
-  if (std::isfinite(birth.lifetime)) start_ageing();
   const std::uint32_t slot = free_.back();
   free_.pop_back();
   const Index i = count_++;
   Particle p;
   p.position = birth.position - settings_.origin, p.velocity = birth.velocity;
-  p.remaining = p.previous_remaining =
-      std::isfinite(birth.lifetime) ? S(birth.lifetime - (time_now - birth.time)) : std::numeric_limits<S>::max();
+  p.death = (tick ? birth.time : now_) + birth.lifetime;
   p.inverse_mass = S(1 / birth.mass);
   p.lifetime = birth.lifetime, p.size = float(birth.size), p.serial = next_serial_++, p.slot = slot;
   p.kind = std::uint8_t(birth.kind);
@@ -409,7 +395,7 @@ Handle ParticleSystem<S>::add(const Birth& birth) {
         "particles \"" + name() +
         "\": a particle needs finite position and velocity, positive mass and lifetime, a size of 0 or "
         "more and a kind from 0 to 255");
-  if (!append(birth, birth.time, nullptr)) return {std::numeric_limits<std::uint32_t>::max(), 0};
+  if (!append(birth, nullptr)) return {std::numeric_limits<std::uint32_t>::max(), 0};
   return handle(count_ - 1);
 }
 
@@ -497,7 +483,6 @@ Tile<S> ParticleSystem<S>::tile_at(Index first, Index count) {
   Tile<S> tile;
   tile.count = count;
   for (int k = 0; k < 3; ++k) tile.x[k] = position_.col(k).data() + first, tile.v[k] = velocity_.col(k).data() + first;
-  if (remaining_.size() > 0) tile.remaining = remaining_.data() + first;
   if (has_mass_) tile.inverse_mass = inverse_mass_.data() + first;
   tile.same_inverse_mass = S(1 / same_mass_);
   tile.serial = serial_.data() + first;
@@ -699,11 +684,9 @@ void ParticleSystem<S>::move(Tile<S> tile, Index first, Plan& plan, Worker& w) {
       std::copy_n(tile.x[k], tile.count, previous_position_.col(k).data() + first);
       std::copy_n(tile.v[k], tile.count, previous_velocity_.col(k).data() + first);
     }
-    if (tile.remaining) std::copy_n(tile.remaining, tile.count, previous_remaining_.data() + first);
   }
   w.hits.clear();
   Flight<S> flight_plan;
-  flight_plan.ageing = first >= 0 ? S(plan.end - plan.start) : S(0);
   if (plan.way == Plan::Way::Fused) {
     flight_plan.legs = plan.legs;
     flight_plan.last = &plan.last[0];
@@ -715,9 +698,8 @@ void ParticleSystem<S>::move(Tile<S> tile, Index first, Plan& plan, Worker& w) {
   } else {
     integrate(tile, first, plan, w);
   }
-  const Landing landing = fly(tile, flight_plan);
-  w.finite = w.finite && landing.finite;
-  if (landing.died) w.dying.push_back(first);
+  const bool finite = fly(tile, flight_plan);
+  w.finite = w.finite && finite;
   for (const Hit<S>& hit : w.hits) {
     Event event;
     event.on = SubEmitterSettings::On::Impact;
@@ -748,7 +730,6 @@ void ParticleSystem<S>::fly_newborn(Index i, double t0, const Tick& tick) {
     x[k][0] = position_(i, k), v[k][0] = velocity_(i, k);
     tile.x[k] = x[k], tile.v[k] = v[k];
   }
-  tile.remaining = nullptr;
   if (has_mass_) inverse_mass[0] = inverse_mass_[i], tile.inverse_mass = inverse_mass;
   w.events.clear();
   // Forces that look at neighbours were prepared before it was born; -1 marks that it has no place among them.
@@ -767,6 +748,9 @@ void ParticleSystem<S>::simulate_tick(const Tick& tick) {
   removed_.clear();
   previous_counts_ = counts_;
   previous_serial_ = next_serial_;
+  // Time that passed without it does not age.
+  if (tick.start != now_) deaths_.shift(tick.start - now_);
+  previous_now_ = tick.start, now_ = tick.end;
   events_.assign(early_.begin(), early_.end());
   for (Event& event : events_) event.order -= 1'000'000;  // before those of this tick
   early_.clear();
@@ -786,7 +770,7 @@ void ParticleSystem<S>::simulate_tick(const Tick& tick) {
   std::atomic<Index> next{0};
   const auto work = [&](int number) {
     Worker& w = *workers_[std::size_t(number)];
-    w.events.clear(), w.dying.clear();
+    w.events.clear();
     w.finite = true;
     for (;;) {
       const Index from = next.fetch_add(at_once);
@@ -802,15 +786,10 @@ void ParticleSystem<S>::simulate_tick(const Tick& tick) {
   else
     work(0);
 
-  dead_.clear();
   for (int i = 0; i < threads; ++i) {
-    Worker& w = *workers_[std::size_t(i)];
-    events_.insert(events_.end(), w.events.begin(), w.events.end());
-    for (const Index first : w.dying)
-      for (Index k = first; k < std::min(first + span, count_); ++k)
-        if (remaining_[k] <= 0) dead_.push_back(k);
+    const std::vector<Event>& events = workers_[std::size_t(i)]->events;
+    events_.insert(events_.end(), events.begin(), events.end());
   }
-  std::sort(dead_.begin(), dead_.end());
   // A particle's impacts are in order; particles are not, where threads share them.
   std::sort(events_.begin(), events_.end(), [](const Event& a, const Event& b) {
     return a.particle != b.particle ? a.particle < b.particle : a.order < b.order;
@@ -851,11 +830,11 @@ void ParticleSystem<S>::sub_births() {
 }
 
 template <class S>
-void ParticleSystem<S>::births(double t0, double t1, const Tick* tick) {
+void ParticleSystem<S>::births(const Tick& tick) {
   born_.clear();
   if (!sub_emitters_.empty()) sub_births();
   const std::size_t children = born_.size();
-  for (const Emitter& emitter : emitters_) emitter.births(t0, t1, born_);
+  for (const Emitter& emitter : emitters_) emitter.births(tick.start, tick.end, born_);
   Index wanted = Index(born_.size());
   std::size_t skipped = 0;
   if (settings_.at_capacity == ParticleSettings::AtCapacity::OldestDies && count_ + wanted > settings_.capacity &&
@@ -878,7 +857,7 @@ void ParticleSystem<S>::births(double t0, double t1, const Tick* tick) {
   births_begin_ = count_;
   events_.clear();
   for (std::size_t i = skipped; i < born_.size(); ++i) {
-    if (!append(born_[i], t1, tick) || !wants_births_ || i < children) continue;
+    if (!append(born_[i], &tick) || !wants_births_ || i < children) continue;
     const Birth& birth = born_[i];
     Event event{SubEmitterSettings::On::Birth,
                 count_ - 1,
@@ -895,15 +874,14 @@ void ParticleSystem<S>::births(double t0, double t1, const Tick* tick) {
   if (!events_.empty()) {
     born_.clear();
     sub_births();
-    for (const Birth& birth : born_) append(birth, t1, tick);
+    for (const Birth& birth : born_) append(birth, &tick);
   }
   // Lives that are shorter than what was left of the tick.
-  if (remaining_.size() > 0)
-    for (Index i = count_; i-- > births_begin_;)
-      if (remaining_[i] <= 0) {
-        drop_newborn(i);
-        ++counts_.died;
-      }
+  for (Index i = count_; i-- > births_begin_;)
+    if (deaths_[i] <= last_moment(tick)) {
+      drop_newborn(i);
+      ++counts_.died;
+    }
 }
 
 // Taken back before anybody saw it; what fills its place is a newborn too.
@@ -957,6 +935,8 @@ StepReport ParticleSystem<S>::advance(const Tick& tick) {
     return report;
   }
   // Deaths, then births: the events of both are known before anything changes its place.
+  dead_.clear();
+  deaths_.take(last_moment(tick), count_, dead_);
   if (settings_.dies_on_impact) {
     for (const Event& event : events_) dead_.push_back(event.particle);
     std::sort(dead_.begin(), dead_.end());
@@ -978,7 +958,7 @@ StepReport ParticleSystem<S>::advance(const Tick& tick) {
     }
   remove_all(dead_);
   counts_.died += std::int64_t(dead_.size());
-  births(tick.start, tick.end, &tick);
+  births(tick);
   keep_trail();
   return {};
 }
@@ -1016,9 +996,9 @@ void ParticleSystem<S>::take_back() {
   early_.clear();
   position_.topRows(count_) = previous_position_.topRows(count_);
   velocity_.topRows(count_) = previous_velocity_.topRows(count_);
-  if (remaining_.size() > 0) remaining_.head(count_) = previous_remaining_.head(count_);
   counts_ = previous_counts_;
   next_serial_ = previous_serial_;
+  now_ = previous_now_;
 }
 
 // ---- Forces of the user
@@ -1080,7 +1060,7 @@ template <class S>
 double ParticleSystem<S>::age(Index i) const {
   check_index(i);
   const double life = lifetime_[std::size_t(i)];
-  return std::isfinite(life) ? std::max(0.0, life - double(remaining_[i])) : 0;
+  return std::isfinite(life) ? std::max(0.0, life - (deaths_[i] - now_)) : 0;
 }
 
 template <class S>
@@ -1264,14 +1244,12 @@ void ParticleSystem<S>::save(CheckpointWriter& out) const {
   const auto rows = [&](const Points<S>& p) { out.add(Points<S>(p.topRows(count_))); };
   const auto values = [&](const Values<S>& v) { out.add(Values<S>(v.head(count_))); };
   const auto list = [&](const auto& v) { out.add(std::span(v.data(), std::size_t(count_))); };
-  const bool ages = remaining_.size() > 0;
   out.begin("particles");
   out.add(std::uint64_t(count_));
   rows(position_), rows(velocity_);
   if (settings_.keeps_previous) rows(previous_position_), rows(previous_velocity_);
-  out.add(ages);
-  if (ages) values(remaining_);
-  if (ages && settings_.keeps_previous) values(previous_remaining_);
+  out.add(now_);
+  out.add(deaths_.times(count_));
   out.add(same_mass_);
   out.add(has_mass_);
   if (has_mass_) values(inverse_mass_);
@@ -1355,11 +1333,12 @@ void ParticleSystem<S>::load(CheckpointReader& in) {
     read_rows("previous position", previous_position_);
     read_rows("previous velocity", previous_velocity_);
   }
-  remaining_.resize(0), previous_remaining_.resize(0);
-  if (in.number<bool>("somebody ages")) {
-    start_ageing();
-    read_values("remaining life", remaining_);
-    if (settings_.keeps_previous) read_values("previous remaining life", previous_remaining_);
+  now_ = previous_now_ = in.number<double>("time");
+  std::vector<double> deaths(std::size_t(n), 0.0);
+  list("death", deaths);
+  for (Index i = 0; i < n; ++i) {
+    in.require(!std::isnan(deaths[std::size_t(i)]), "death", "must be a time");
+    deaths_.set(i, deaths[std::size_t(i)]);
   }
   same_mass_ = in.number<double>("common mass", std::numeric_limits<double>::min());
   has_mass_ = false;

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <hooke/body.hpp>
+#include <hooke/particles/deaths.hpp>
 #include <hooke/particles/emitter.hpp>
 #include <hooke/particles/force.hpp>
 
@@ -145,11 +146,10 @@ class ParticleSystem final : public Body {
   };
 
   void check_index(Index i) const;
-  void start_ageing();
   void start_weighing();
   Particle get(Index i) const;
   void put(Index i, const Particle& particle);
-  bool append(const Birth& birth, double time_now, const Tick* tick);
+  bool append(const Birth& birth, const Tick* tick);
   void remove(Index i);
   void remove_now(Index i);
   void drop_newborn(Index i);
@@ -162,7 +162,7 @@ class ParticleSystem final : public Body {
   void integrate(Tile<S>& tile, Index first, Plan& plan, Worker& worker);
   void accelerate(const Tile<S>& tile, Index first, double t, S* const a[3]) const;
   void spend_bank(double seconds);
-  void births(double t0, double t1, const Tick* tick);
+  void births(const Tick& tick);
   void sub_births();
   void simulate_tick(const Tick& tick);
   void prewarm(const Tick& tick);
@@ -179,10 +179,10 @@ class ParticleSystem final : public Body {
   Index count_ = 0;
   Index padded_ = 0;
   Points<S> position_, velocity_;
-  Values<S> remaining_;     // empty where nothing dies of age
   Values<S> inverse_mass_;  // empty where all weigh the same
   double same_mass_ = 1;
   bool has_mass_ = false;
+  Deaths deaths_;
   std::vector<double> lifetime_;
   std::vector<float> size_;
   std::vector<std::uint64_t> serial_;
@@ -190,7 +190,6 @@ class ParticleSystem final : public Body {
   std::vector<std::uint8_t> kind_;
   Points<float> birth_place_;
   Points<S> previous_position_, previous_velocity_;
-  Values<S> previous_remaining_;
   std::vector<Points<float>> trail_;  // one a tick, newest at trail_head_
   std::vector<std::uint8_t> trail_length_;
   Index trail_head_ = 0;
@@ -209,6 +208,7 @@ class ParticleSystem final : public Body {
   std::vector<Removed> removed_;
   Index births_begin_ = 0;
   std::uint64_t previous_serial_ = 0;
+  double previous_now_ = 0;
 
   std::unique_ptr<Plan> plan_;
   std::vector<std::unique_ptr<Worker>> workers_;
@@ -218,6 +218,7 @@ class ParticleSystem final : public Body {
   std::vector<Birth> born_;
   std::vector<Index> dead_;
   std::vector<std::pair<std::uint64_t, Index>> oldest_;
+  double now_ = 0;  // end of the last tick [s]; deaths_ are told in the same time
   bool started_ = false, warming_ = false;
   int steps_ = 1;
   std::int64_t evaluations_ = 0;

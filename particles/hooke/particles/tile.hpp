@@ -16,7 +16,6 @@ struct Tile {
   Index count = 0;
   S* x[3] = {};                           ///< position [m]
   S* v[3] = {};                           ///< velocity [m/s]
-  S* remaining = nullptr;                 ///< life that is left [s]; null where nothing ages
   const S* inverse_mass = nullptr;        ///< [1/kg]; null where all weigh the same
   S same_inverse_mass = 1;                ///< [1/kg], where they do
   const std::uint64_t* serial = nullptr;  ///< number of birth
