@@ -262,8 +262,8 @@ void PointBody<S>::acceleration(const Points<S>& x, const Points<S>& v, double t
     a.setZero(x.rows(), 3);
   } else {
     force_.setZero(x.rows(), 3);
-    // Only of the state itself is it known what rounding has dropped.
-    const Points<S>* low = &x == &points_.position ? integrator_.position_low() : nullptr;
+    // Only of the state itself is it known what rounding has dropped, and what moves fast does not need it.
+    const Points<S>* low = slow_ && &x == &points_.position ? integrator_.position_low() : nullptr;
     for (const auto& field : fields_) {
       if (low)
         field->add_fine_force(x, *low, v, t, force_);
@@ -410,11 +410,8 @@ template <class S>
 bool PointBody<S>::run_fast() {
   const auto* table = std::get_if<Splitting>(&settings_.method->scheme);
   if (!fused() || watching_ || prescribes() || collides()) return false;
+  if (slow_) return false;
   const double h = (tick_.end - tick_.start) / double(substeps_);
-  if (std::is_same_v<S, float> && settings_.compensated) {
-    const double least = kSlow * double(std::numeric_limits<S>::epsilon()) * double(points_.position.abs().maxCoeff());
-    if (h * std::sqrt(double(points_.velocity.square().sum()) / double(size())) < least) return false;
-  }
   stages_.clear();
   std::int64_t evaluations = 0;
   for (Index i = 0; i < substeps_; ++i)
@@ -436,11 +433,20 @@ bool PointBody<S>::run_fast() {
   return true;
 }
 
+template <class S>
+bool PointBody<S>::is_slow() const {
+  if (!std::is_same_v<S, float> || !settings_.compensated) return false;
+  const double h = (tick_.end - tick_.start) / double(substeps_);
+  const double least = kSlow * double(std::numeric_limits<S>::epsilon()) * double(points_.position.abs().maxCoeff());
+  return h * std::sqrt(double(points_.velocity.square().sum()) / double(size())) < least;
+}
+
 // All substeps of tick_, or those up to the one that fails.
 template <class S>
 SolveResult PointBody<S>::run_tick() {
   const double length = tick_.end - tick_.start;
   integrator_.restart();
+  slow_ = is_slow();
   if (settings_.collides && !tick_.colliders.empty())
     contacts_.begin_tick(tick_.colliders, points_, tick_.start, tick_.end, settings_.thickness);
   SolveResult solve;
@@ -599,6 +605,7 @@ double PointBody<S>::unbalanced(const Points<S>& x, Points<S>& left) {
 template <class S>
 double PointBody<S>::residual_force(const Vec3& gravity) {
   tick_.gravity = gravity;
+  slow_ = true;
   Points<S> left;
   return unbalanced(points_.position, left);
 }

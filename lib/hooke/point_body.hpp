@@ -162,6 +162,7 @@ class PointBody : public Body, protected Dynamics<S> {
   void hold(Index point);
   SolveResult run_tick();
   bool run_fast();
+  bool is_slow() const;
   StepReport explain(bool finite_state);
   StepReport try_tick();
   void changed(Index point);
@@ -193,6 +194,7 @@ class PointBody : public Body, protected Dynamics<S> {
   std::vector<Moving> moving_;
   double frame_start_ = 0, frame_end_ = 0;
   Index substeps_ = 0;
+  bool slow_ = false;  // it moves so little a substep that rounding shows
   double wanted_dt_ = 0, last_estimate_ = -1;
   bool passive_ = true;    // all fields are
   double free_mass_ = -1;  // [kg]; negative: to be summed up again

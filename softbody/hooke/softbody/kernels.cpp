@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <type_traits>
 
 namespace hooke::softbody {
 
@@ -20,8 +21,11 @@ HOOKE_INLINE void add(S* target, const S* source, S sign, int n) {
   for (int i = 0; i < n; ++i) target[i] += sign * source[i];
 }
 
+// Where what the rounding of places has dropped is known, lengths are double: in float the rounding of l² - L² alone
+// would shake what rests.
 template <class S, bool damped, bool fine>
 HOOKE_INLINE void spring_loop(SpringBlock<S>& s) {
+  using T = std::conditional_t<fine, double, S>;
   const S *ax = s.a[0], *ay = s.a[1], *az = s.a[2], *bx = s.b[0], *by = s.b[1], *bz = s.b[2];
   const S *k = s.stiffness, *rest = s.rest, *rest2 = s.rest_squared;
   const S *c = s.damping, *vax = s.va[0], *vay = s.va[1], *vaz = s.va[2], *vbx = s.vb[0], *vby = s.vb[1],
@@ -32,23 +36,24 @@ HOOKE_INLINE void spring_loop(SpringBlock<S>& s) {
   const int n = s.n;
   HOOKE_INDEPENDENT
   for (int i = 0; i < n; ++i) {
-    S dx = bx[i] - ax[i], dy = by[i] - ay[i], dz = bz[i] - az[i];
-    if constexpr (fine) dx += lbx[i] - lax[i], dy += lby[i] - lay[i], dz += lbz[i] - laz[i];
-    const S l2 = dx * dx + dy * dy + dz * dz;
-    const S root = std::sqrt(l2);
-    const S l = root > kTiny<S> ? root : kTiny<S>;
-    const S sum = l + rest[i];
-    S scale;
+    T dx = T(bx[i]) - T(ax[i]), dy = T(by[i]) - T(ay[i]), dz = T(bz[i]) - T(az[i]);
+    if constexpr (fine)
+      dx += T(lbx[i]) - T(lax[i]), dy += T(lby[i]) - T(lay[i]), dz += T(lbz[i]) - T(laz[i]);
+    const T l2 = dx * dx + dy * dy + dz * dz;
+    const T root = std::sqrt(l2);
+    const T l = root > kTiny<T> ? root : kTiny<T>;
+    const T sum = l + T(rest[i]);
+    T scale;
     if constexpr (damped) {
       // k (l² - L²) / (l (l + L)) + c v·d / l², over one denominator: one division instead of two.
-      const S closing = (vbx[i] - vax[i]) * dx + (vby[i] - vay[i]) * dy + (vbz[i] - vaz[i]) * dz;
-      scale = (k[i] * (l2 - rest2[i]) * l + c[i] * closing * sum) / (l * l * sum);
+      const T closing = (T(vbx[i]) - T(vax[i])) * dx + (T(vby[i]) - T(vay[i])) * dy + (T(vbz[i]) - T(vaz[i])) * dz;
+      scale = (T(k[i]) * (l2 - T(rest2[i])) * l + T(c[i]) * closing * sum) / (l * l * sum);
     } else {
-      scale = k[i] * (l2 - rest2[i]) / (l * sum);
+      scale = T(k[i]) * (l2 - T(rest2[i])) / (l * sum);
     }
-    fx[i] = scale * dx;
-    fy[i] = scale * dy;
-    fz[i] = scale * dz;
+    fx[i] = S(scale * dx);
+    fy[i] = S(scale * dy);
+    fz[i] = S(scale * dz);
   }
 }
 
