@@ -46,6 +46,7 @@ int report(const ReportOptions& options);
 
 struct StabilityOptions {
   std::vector<std::string> cases;  ///< names of hard cases; empty: all
+  std::string method;              ///< of the rows; empty: all
   std::filesystem::path out;       ///< folder for table.csv, table.html, table.md and table.png
   bool thorough = false;           ///< minutes of simulated time
   int threads = 1;                 ///< that share the rows

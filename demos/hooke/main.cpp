@@ -124,6 +124,7 @@ int dispatch(int argc, char** argv) {
   CLI::App* stability_command =
       app.add_subcommand("stability", "Hard cases: what stays bounded, comes to rest and keeps its energy");
   stability_command->add_option("case", a.stability.cases, "Names of hard cases; all if none is given");
+  stability_command->add_option("--method", a.stability.method, "Only the rows of this method, e.g. xpbd");
   stability_command->add_option("--out", a.stability.out, "Folder for the table: CSV, HTML, Markdown and a picture")
       ->required();
   stability_command->add_flag("--long", a.stability.thorough,

@@ -57,6 +57,7 @@ std::vector<Row> measure(const Case& hard, const std::vector<stability::Trial>& 
 std::string command_of(const StabilityOptions& options) {
   std::string out = "hooke stability";
   for (const std::string& name : options.cases) out += " " + name;
+  if (!options.method.empty()) out += " --method " + options.method;
   return out + (options.thorough ? " --long" : "") + " --out DIR";
 }
 
@@ -66,6 +67,12 @@ int stability(const StabilityOptions& options) {
   if (options.threads < 1 || options.threads > 1024)
     throw Error("--threads must be from 1 to 1024, got " + std::to_string(options.threads));
   const std::vector<Case> cases = chosen_cases(options);
+  const std::vector<std::string> methods = stability::solvers();
+  if (!options.method.empty() && std::find(methods.begin(), methods.end(), options.method) == methods.end()) {
+    std::string names;
+    for (const std::string& name : methods) names += (names.empty() ? "" : ", ") + name;
+    throw Error("--method: the table has no rows of \"" + options.method + "\"; it has " + names);
+  }
   report::Machine machine = report::this_machine();
   machine.command = command_of(options);
 
@@ -80,7 +87,9 @@ int stability(const StabilityOptions& options) {
   for (; begun < cases.size() && !interrupted(); ++begun) {
     const Case& hard = cases[begun];
     Progress progress(std::to_string(begun + 1) + " of " + std::to_string(cases.size()) + ", " + hard.name);
-    const auto trials = stability::trials(hard, options.thorough);
+    auto trials = stability::trials(hard, options.thorough);
+    if (!options.method.empty())
+      std::erase_if(trials, [&](const auto& trial) { return trial.solver.method != options.method; });
     for (Row& row : measure(hard, trials, options.threads, [&](double done) { progress.show(done); })) {
       table.add(row, machine);
       rows.push_back(std::move(row));

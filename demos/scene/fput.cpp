@@ -15,6 +15,7 @@ class FputSprings final : public ForceField<S> {
  public:
   explicit FputSprings(const FputChain& chain) : stiffness_(S(0.5 * chain.omega * chain.omega)) {}
   bool uses_velocity() const override { return false; }
+  bool passive() const override { return true; }
 
   void add_force(const Points<S>& x, const Points<S>&, double, Points<S>& f) const override {
     const auto q = x.col(0);

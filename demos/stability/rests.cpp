@@ -106,7 +106,7 @@ Case energy() {
       }
       return std::move(build(*standard.description, trial.solver).world);
     }();
-    Watch watch(world, row, 1e5, allowance(trial));
+    Watch watch(world, row, 1e5, allowance(trial, 3));
     watch.energy = true;
     watch.run(seconds);
     judge(row, row.energy_growth, 1e-3);

@@ -22,6 +22,10 @@ constexpr double kStepCheckInterval = 0.25;
 // In float, bodies that move less than so many roundings of their size a substep are moved where sums are
 // compensated.
 constexpr double kSlow = 256;
+// The automatic step of undamped bodies keeps the swing of their energy, h²/8 Σ m |a|² with Verlet, below this share
+// of what their motion exchanges. It is looked at this often [s], and the share leaves room for what is between.
+constexpr double kSwing = 5e-4;
+constexpr double kSwingInterval = 0.25;
 // Methods without a stable step still need one: ω h of this.
 constexpr double kUnstablePhase = 0.05;
 
@@ -389,11 +393,38 @@ void PointBody<S>::choose_substeps(const Tick& tick) {
     wanted_dt_ = length;
   } else if (last_estimate_ < 0 || tick.start - last_estimate_ >= kEstimateInterval * (1 - 1e-9)) {
     last_estimate_ = tick.start;
-    wanted_dt_ = automatic_step();
+    wanted_dt_ = step_share_ * automatic_step();
   }
   const double count = std::ceil(length / wanted_dt_ - 1e-9);
   substeps_ = std::clamp<Index>(count < double(settings_.max_substeps) ? Index(count) : settings_.max_substeps, 1,
                                 settings_.max_substeps);
+}
+
+// Near the largest stable step an oscillation's energy swings by several times itself, and one that begins at full
+// speed swings too far. Damping would take that away; without it the step has to be smaller where much of the motion
+// is that fast. It only shrinks: each change of the step costs some energy itself.
+template <class S>
+void PointBody<S>::bound_swing(const Tick& tick) {
+  const Method& method = *settings_.method;
+  if (settings_.dt > 0 || !method.symplectic || method.order != 2 || std::isinf(method.stability_limit)) return;
+  if (!alone() || fields_.empty() || loses_energy()) return;
+  if (swing_checked_ >= 0 && tick.start - swing_checked_ < kSwingInterval * (1 - 1e-9)) return;
+  swing_checked_ = tick.start;
+  const double h = (tick.end - tick.start) / double(substeps_);
+  Points<S> a(size(), 3);
+  acceleration(points_.position, points_.velocity, tick.start, a);
+  const bool falls_freely = (points_.inverse_mass > S(0)).all() && (tick.colliders.empty() || !settings_.collides);
+  if (falls_freely) a.rowwise() -= tick.gravity.transpose().array().template cast<S>();
+  const double swing =
+      h * h / 8 * double((points_.mass * (points_.inverse_mass > S(0)).select(a.square().rowwise().sum(), S(0))).sum());
+  // What starts from rest has fallen for as long as this is not looked at.
+  const double fall = tick.gravity.norm() * kSwingInterval;
+  const Energy energy = this->energy(tick.gravity);
+  exchanged_ = std::max(exchanged_, energy.kinetic + energy.elastic + total_mass() * fall * fall / 2);
+  if (swing <= kSwing * exchanged_) return;
+  step_share_ *= std::sqrt(kSwing / 2 * exchanged_ / swing);
+  last_estimate_ = -1;
+  choose_substeps(tick);
 }
 
 template <class S>
@@ -532,6 +563,7 @@ StepReport PointBody<S>::advance(const Tick& tick) {
   choose_substeps(tick);
   spend_bank(tick.end - tick.start);
   hold_fields(tick.start);
+  bound_swing(tick);
   check_step();
   begin_energy_watch();
   StepReport report = try_tick();
@@ -816,6 +848,9 @@ void PointBody<S>::save(CheckpointWriter& out) const {
   out.add(std::int64_t(substeps_));
   out.add(wanted_dt_);
   out.add(last_estimate_);
+  out.add(step_share_);
+  out.add(swing_checked_);
+  out.add(exchanged_);
   integrator_.save(out);
   out.end();
 
@@ -876,6 +911,9 @@ void PointBody<S>::load(CheckpointReader& in) {
   substeps_ = Index(in.number<std::int64_t>("substeps", 0, settings_.max_substeps));
   wanted_dt_ = in.number<double>("wanted step", 0, std::numeric_limits<double>::infinity());
   last_estimate_ = in.number<double>("last estimate", -1);
+  step_share_ = in.number<double>("share of the step", 0, 1);
+  swing_checked_ = in.number<double>("last look at the swing", -1);
+  exchanged_ = in.number<double>("energy exchanged", 0);
   integrator_.load(in, n);
   in.end();
 

@@ -157,6 +157,7 @@ class PointBody : public Body, protected Dynamics<S> {
   typename ForceField<S>::Rates rate_bounds() const;
   double automatic_step() const;
   void choose_substeps(const Tick& tick);
+  void bound_swing(const Tick& tick);
   void spend_bank(double seconds);
   void hold_fields(double t);
   void hold(Index point);
@@ -196,6 +197,7 @@ class PointBody : public Body, protected Dynamics<S> {
   Index substeps_ = 0;
   bool slow_ = false;  // it moves so little a substep that rounding shows
   double wanted_dt_ = 0, last_estimate_ = -1;
+  double step_share_ = 1, swing_checked_ = -1, exchanged_ = 0;  // of the automatic step; [s]; [J]
   bool passive_ = true;    // all fields are
   double free_mass_ = -1;  // [kg]; negative: to be summed up again
 
