@@ -11,8 +11,6 @@ void check_index(Index point, Index size) {
     throw std::out_of_range("point " + std::to_string(point) + " of " + std::to_string(size));
 }
 
-Vec3 row(const Points<double>& p, Index i) { return p.row(i).matrix().transpose(); }
-
 }  // namespace
 
 std::string StepReport::text() const {

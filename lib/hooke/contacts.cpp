@@ -13,16 +13,6 @@ namespace {
 // looked up again [m].
 constexpr double kSlack = 5e-3;
 
-template <class S>
-Eigen::Matrix<S, 3, 1> row(const Points<S>& p, Index i) {
-  return {p(i, 0), p(i, 1), p(i, 2)};
-}
-
-template <class S>
-void set_row(Points<S>& p, Index i, const Eigen::Matrix<S, 3, 1>& value) {
-  for (int k = 0; k < 3; ++k) p(i, k) = value[k];
-}
-
 // First root in [0, 1] of |d + s m|² = r², or infinity. `d` starts outside.
 template <class S>
 S sphere_entry(const Eigen::Matrix<S, 3, 1>& d, const Eigen::Matrix<S, 3, 1>& m, S r) {
@@ -397,18 +387,6 @@ bool Contacts<S>::entry(const Solid& solid, const Vec& from, const Vec& to, Vec&
   if (!(first <= 1)) return false;
   hit = from + first * way;
   return true;
-}
-
-// Removes the approach from a velocity relative to the surface, and of the sliding what Coulomb's
-// friction takes. Returns the approach, 0 where there was none.
-template <class S>
-S Contacts<S>::rub(const Vec& normal, S friction, Vec& relative) {
-  const S approach = -relative.dot(normal);
-  if (!(approach > 0)) return S(0);
-  relative += approach * normal;
-  const S sliding = relative.norm();
-  if (sliding > 0) relative *= std::max(S(0), 1 - friction * approach / sliding);
-  return approach;
 }
 
 // One candidate in one substep: x and v after a move that began at `from`.

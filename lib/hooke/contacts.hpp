@@ -17,6 +17,18 @@ struct ContactPlane {
   S friction, restitution;
 };
 
+/// Removes the approach from a velocity relative to a surface, and of the sliding what Coulomb's friction takes.
+/// @param normal unit, out of the solid  @returns the approach, 0 where there was none
+template <class S>
+S rub(const Eigen::Matrix<S, 3, 1>& normal, S friction, Eigen::Matrix<S, 3, 1>& relative) {
+  const S approach = -relative.dot(normal);
+  if (!(approach > 0)) return S(0);
+  relative += approach * normal;
+  const S sliding = relative.norm();
+  if (sliding > 0) relative *= std::max(S(0), 1 - friction * approach / sliding);
+  return approach;
+}
+
 /// Keeps points at least `thickness` outside of the colliders' surfaces.
 ///
 /// Candidates (point, shape) are found once a tick from swept bounds, and again in the
@@ -105,7 +117,6 @@ class Contacts {
   S box_entry(const Solid& solid, const Vec& from, const Vec& way) const;
   S grid_entry(const Solid& solid, const Vec& from, const Vec& way) const;
   void touch(Index point, const Solid& before, const Solid& after, const Vec& from, S move, S h, Vec& x, Vec& v);
-  static S rub(const Vec& normal, S friction, Vec& relative);
 
   std::span<const Collider> colliders_;
   Vec3 origin_{0, 0, 0};

@@ -36,16 +36,6 @@ double tolerance_of(const Implicit& scheme) {
 }
 
 template <class S>
-Eigen::Matrix<S, 3, 1> row(const Points<S>& p, Index i) {
-  return {p(i, 0), p(i, 1), p(i, 2)};
-}
-
-template <class S>
-void set_row(Points<S>& p, Index i, const Eigen::Matrix<S, 3, 1>& value) {
-  for (int k = 0; k < 3; ++k) p(i, k) = value[k];
-}
-
-template <class S>
 double dot(const Points<S>& p, const Points<S>& q) {
   return (p.template cast<double>() * q.template cast<double>()).sum();
 }
@@ -218,12 +208,7 @@ void ImplicitSolver<S>::bear(Points<S>& a) const {
   for (const Contact& contact : contacts_) {
     if (contact.touch == Touch::Free) continue;
     Vec value = row(a, contact.point);
-    const S pressing = -value.dot(contact.normal);
-    if (!(pressing > 0)) continue;
-    value += pressing * contact.normal;
-    const S along = value.norm();
-    if (along > 0) value *= std::max(S(0), 1 - contact.friction * pressing / along);
-    set_row<S>(a, contact.point, value);
+    if (hooke::rub<S>(contact.normal, contact.friction, value) > 0) set_row<S>(a, contact.point, value);
   }
 }
 

@@ -22,9 +22,9 @@ constexpr double kStepCheckInterval = 0.25;
 // In float, bodies that move less than so many roundings of their size a substep are moved where sums are
 // compensated.
 constexpr double kSlow = 256;
-// The automatic step of undamped bodies keeps the swing of their energy, h²/8 Σ m |a|² with Verlet, below this share
-// of what their motion exchanges. It is looked at this often [s], and the share leaves room for what is between.
-constexpr double kSwing = 5e-4;
+// The automatic step of undamped bodies keeps the swing of their energy below this share of what their motion
+// exchanges. It is looked at this often [s].
+constexpr double kSwing = 8e-4;
 constexpr double kSwingInterval = 0.25;
 // Methods without a stable step still need one: ω h of this.
 constexpr double kUnstablePhase = 0.05;
@@ -402,7 +402,9 @@ void PointBody<S>::choose_substeps(const Tick& tick) {
 
 // Near the largest stable step an oscillation's energy swings by several times itself, and one that begins at full
 // speed swings too far. Damping would take that away; without it the step has to be smaller where much of the motion
-// is that fast. It only shrinks: each change of the step costs some energy itself.
+// is that fast. With Verlet the swing is h²/8 Σ m |a|²; as much again is to come of what moves, h²/8 vᵀK v, and for
+// an oscillation the sum is always the same, (ω h)²/4 of its energy. The step only shrinks: each change costs some
+// energy itself.
 template <class S>
 void PointBody<S>::bound_swing(const Tick& tick) {
   const Method& method = *settings_.method;
@@ -413,10 +415,14 @@ void PointBody<S>::bound_swing(const Tick& tick) {
   const double h = (tick.end - tick.start) / double(substeps_);
   Points<S> a(size(), 3);
   acceleration(points_.position, points_.velocity, tick.start, a);
-  const bool falls_freely = (points_.inverse_mass > S(0)).all() && (tick.colliders.empty() || !settings_.collides);
+  const auto free = points_.inverse_mass > S(0);
+  const bool falls_freely = free.all() && (tick.colliders.empty() || !settings_.collides);
   if (falls_freely) a.rowwise() -= tick.gravity.transpose().array().template cast<S>();
-  const double swing =
-      h * h / 8 * double((points_.mass * (points_.inverse_mass > S(0)).select(a.square().rowwise().sum(), S(0))).sum());
+  double swing = double((points_.mass * free.select(a.square().rowwise().sum(), S(0))).sum());
+  force_.setZero(size(), 3);
+  for (const auto& field : fields_) field->add_stiffness_times(points_.position, points_.velocity, true, force_);
+  swing += double((points_.velocity * force_).sum());
+  swing *= h * h / 8;
   // What starts from rest has fallen for as long as this is not looked at.
   const double fall = tick.gravity.norm() * kSwingInterval;
   const Energy energy = this->energy(tick.gravity);
@@ -493,9 +499,6 @@ SolveResult PointBody<S>::run_tick() {
 // within a tick, so the tick is run again under watch for where it came from.
 template <class S>
 StepReport PointBody<S>::explain(bool finite_state) {
-  StepReport report;
-  report.body = name();
-  report.time = tick_.start;
   Index broken = -1;
   for (Index i = 0; i < size() && broken < 0; ++i)
     if (!points_.position.row(i).allFinite() || !points_.velocity.row(i).allFinite()) broken = i;
@@ -505,13 +508,22 @@ StepReport PointBody<S>::explain(bool finite_state) {
   watching_ = false;
   take_back();
   const bool solver_failed = finite_state && !fields_at_fault_;
-  report.status = solver_failed ? StepReport::Status::NotConverged : StepReport::Status::NotFinite;
+  StepReport report = report_of(solver_failed ? StepReport::Status::NotConverged : StepReport::Status::NotFinite);
   if (!solver_failed) report.point = culprit_ >= 0 ? culprit_ : broken;
   if (fields_at_fault_) {
     report.advice = "the force on it was not finite at ordinary positions and velocities; check its force fields";
     return report;
   }
   report.advice = step_advice();
+  return report;
+}
+
+template <class S>
+StepReport PointBody<S>::report_of(StepReport::Status status) const {
+  StepReport report;
+  report.status = status;
+  report.body = name();
+  report.time = tick_.start;
   return report;
 }
 
@@ -532,16 +544,11 @@ StepReport PointBody<S>::try_tick() {
   const std::int64_t unfinished = integrator_.work().unfinished;
   const SolveResult solve = run_tick();
   // What is not finite anywhere is not finite in the velocities, and so in their energy.
-  const auto& v = points_.velocity;
-  const double kinetic =
-      0.5 * double((points_.mass * (v.col(0).square() + v.col(1).square() + v.col(2).square())).sum());
-  const bool good = std::isfinite(kinetic) || (points_.position.allFinite() && v.allFinite());
+  const double kinetic = points_.kinetic_energy();
+  const bool good = std::isfinite(kinetic) || (points_.position.allFinite() && points_.velocity.allFinite());
   if (!good || !solve.converged) return explain(good);
   if (integrator_.work().unfinished > unfinished && !warned_of_step_) {
-    StepReport report;
-    report.status = StepReport::Status::NotConverged;
-    report.body = name();
-    report.time = tick_.start;
+    StepReport report = report_of(StepReport::Status::NotConverged);
     report.advice = "its step was kept, which brings it nearer but not all the way; " + step_advice();
     warn(std::move(report), warned_of_step_);
   }
@@ -602,12 +609,17 @@ bool PointBody<S>::loses_energy() const {
   return uses_velocity_ || !held_fields_.empty() || damped_ || method_does || contacts_.any();
 }
 
+template <class S>
+double PointBody<S>::free_mass() {
+  if (free_mass_ < 0) free_mass_ = double((points_.inverse_mass > S(0)).select(points_.mass, S(0)).sum());
+  return free_mass_;
+}
+
 // Falls asleep after a good tick at whose end nothing moves or wants to.
 template <class S>
 void PointBody<S>::rest(double kinetic) {
   if (!settings_.sleeps || !passive_ || !bank_.empty() || !moving_.empty()) return;
-  if (free_mass_ < 0) free_mass_ = double((points_.inverse_mass > S(0)).select(points_.mass, S(0)).sum());
-  if (2 * kinetic > kQuietSpeed * kQuietSpeed * free_mass_) {
+  if (2 * kinetic > kQuietSpeed * kQuietSpeed * free_mass()) {
     quiet_since_ = tick_.end;
     return;
   }
@@ -646,7 +658,7 @@ double PointBody<S>::residual_force(const Vec3& gravity) {
 template <class S>
 bool PointBody<S>::balanced() {
   Points<S> left, other;
-  if (unbalanced(points_.position, left) <= kQuietForce * free_mass_ * tick_.gravity.norm()) return true;
+  if (unbalanced(points_.position, left) <= kQuietForce * free_mass() * tick_.gravity.norm()) return true;
   // A rounding is off by 1/√12 of an ulp; neighbours must differ: signs from the bits of a multiplied index.
   Points<S> x = points_.position;
   const double residual = unbalanced(x, left);
@@ -671,10 +683,7 @@ bool PointBody<S>::alone() const {
 // -h²/8 |a|² with Verlet, h/2 a·v with semi-implicit Euler, per unit of mass.
 template <class S>
 double PointBody<S>::kept_energy() {
-  double mass = 0;
-  for (Index i = 0; i < size(); ++i)
-    if (points_.inverse_mass[i] != 0) mass += double(points_.mass[i]);
-  const double energy = this->energy(tick_.gravity).total() + mass * tick_.gravity.dot(points_.origin);
+  const double energy = this->energy(tick_.gravity).total() + free_mass() * tick_.gravity.dot(points_.origin);
   const Method& method = *settings_.method;
   if (!method.symplectic || method.order > 2 || std::isinf(method.stability_limit)) return energy;
   const double h = (tick_.end - tick_.start) / double(std::max<Index>(substeps_, 1));
@@ -699,7 +708,7 @@ void PointBody<S>::begin_energy_watch() {
   const double noise = omega * omega * off * off + tick_.gravity.norm() * off;
   // A surface takes gravity's part out of what Verlet keeps.
   const double h = (tick_.end - tick_.start) / double(substeps_), borne = h * tick_.gravity.norm();
-  energy_watch_.start(kept_energy(), energy(tick_.gravity).kinetic, total_mass() * (64 * noise + borne * borne / 4));
+  energy_watch_.start(kept_energy(), points_.kinetic_energy(), total_mass() * (64 * noise + borne * borne / 4));
 }
 
 // After a tick that ended with this kinetic energy [J].
@@ -714,10 +723,7 @@ StepReport PointBody<S>::watch_energy(double kinetic) {
   const double total = kept_energy();
   const auto finding = energy_watch_.judge(total, kinetic);
   if (finding == EnergyWatch::Finding::Fine) return {};
-  StepReport report;
-  report.status = StepReport::Status::EnergyGrew;
-  report.body = name();
-  report.time = tick_.start;
+  StepReport report = report_of(StepReport::Status::EnergyGrew);
   points_.velocity.square().rowwise().sum().maxCoeff(&report.point);
   report.advice = std::to_string(energy_watch_.gain(total)) + " J since it was last given any, " +
                   std::to_string(kinetic) + " J are in its motion, most at this point; " + step_advice();
@@ -750,10 +756,7 @@ void PointBody<S>::check_step() {
     warned_of_step_ = false;
     return;
   }
-  StepReport report;
-  report.status = StepReport::Status::StepTooLong;
-  report.body = name();
-  report.time = tick_.start;
+  StepReport report = report_of(StepReport::Status::StepTooLong);
   report.advice = step_advice();
   warn(std::move(report), warned_of_step_);
 }

@@ -170,12 +170,14 @@ class PointBody : public Body, protected Dynamics<S> {
   bool disturbed(const Tick& tick);
   void rest(double kinetic);
   bool balanced();
+  double free_mass();
   double unbalanced(const Points<S>& x, Points<S>& left);
   bool alone() const;
   double kept_energy();
   void begin_energy_watch();
   StepReport watch_energy(double kinetic);
   void check_step();
+  StepReport report_of(StepReport::Status status) const;
   std::string step_advice() const;
   void warn(StepReport warning, bool& warned);
 
@@ -198,8 +200,8 @@ class PointBody : public Body, protected Dynamics<S> {
   bool slow_ = false;  // it moves so little a substep that rounding shows
   double wanted_dt_ = 0, last_estimate_ = -1;
   double step_share_ = 1, swing_checked_ = -1, exchanged_ = 0;  // of the automatic step; [s]; [J]
-  bool passive_ = true;    // all fields are
-  double free_mass_ = -1;  // [kg]; negative: to be summed up again
+  bool passive_ = true;                                         // all fields are
+  double free_mass_ = -1;                                       // [kg]; negative: to be summed up again
 
   bool asleep_ = false, damped_ = false;  // damped_: by the world, lately
   double quiet_since_ = 0;

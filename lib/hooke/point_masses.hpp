@@ -18,6 +18,11 @@ struct PointMasses {
   Values<S> mass;            ///< [kg]; survives pinning, so that a released point weighs what it did
 
   Index size() const { return position.rows(); }
+  /// ½ Σ m |v|² [J] over all points. Not finite where a velocity is not.
+  double kinetic_energy() const {
+    return 0.5 *
+           double((mass * (velocity.col(0).square() + velocity.col(1).square() + velocity.col(2).square())).sum());
+  }
 };
 
 }  // namespace hooke

@@ -1,5 +1,5 @@
 // The few types that everything else is written in: vectors, point arrays, triangle
-// meshes. SI units everywhere. Nothing here has behaviour.
+// meshes. SI units everywhere.
 #pragma once
 
 #include <Eigen/Core>
@@ -17,6 +17,16 @@ using Mat3 = Eigen::Matrix3d;
 /// so that a loop over one coordinate runs through consecutive numbers.
 template <class S>
 using Points = Eigen::Array<S, Eigen::Dynamic, 3>;
+
+template <class S>
+Eigen::Matrix<S, 3, 1> row(const Points<S>& p, Index i) {
+  return {p(i, 0), p(i, 1), p(i, 2)};
+}
+
+template <class S>
+void set_row(Points<S>& p, Index i, const Eigen::Matrix<S, 3, 1>& value) {
+  for (int k = 0; k < 3; ++k) p(i, k) = value[k];
+}
 
 /// One number a point, shape (n).
 template <class S>

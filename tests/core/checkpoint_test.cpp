@@ -10,6 +10,8 @@
 #include <hooke/softbody/filtered_leapfrog.hpp>
 #include <hooke/softbody/soft_body.hpp>
 
+#include <fuzz.hpp>
+
 #include <gmock/gmock.h>
 
 #include <sstream>
@@ -379,9 +381,9 @@ TEST(Checkpoint, EveryTruncationIsRefused) {
 // Any single changed byte is refused by the checksum; where the checksum was made to fit, the world loads or refuses,
 // and a world that loaded steps or reports.
 TEST(Checkpoint, DamagedBytesNeverCrash) {
-  const unsigned seed = std::random_device{}();
-  SCOPED_TRACE("seed " + std::to_string(seed));
-  std::mt19937 random(seed);
+  const std::uint64_t seed = test::fuzz_seed();
+  SCOPED_TRACE("HOOKE_SEED=" + std::to_string(seed));
+  std::mt19937 random{std::mt19937::result_type(seed)};
   std::vector<Story> all = {hanging(velocity_verlet(), Precision::Float, true, true),
                             hanging(dormand_prince(), Precision::Double, false, false),
                             hanging(softbody::filtered_leapfrog(), Precision::Float, false, true), snooker<double>(),
@@ -393,7 +395,7 @@ TEST(Checkpoint, DamagedBytesNeverCrash) {
     const std::string bytes = saved(*world), contents = bytes.substr(28);
     const auto pick = [&](std::size_t n) { return std::uniform_int_distribution<std::size_t>(0, n - 1)(random); };
     int loaded = 0;
-    for (int i = 0; i < 2000; ++i) {
+    for (int i = 0, n = test::fuzz_rounds(2000); i < n; ++i) {
       std::string damaged = bytes;
       damaged[pick(bytes.size())] ^= char(1 + pick(255));
       ASSERT_NE(refusal(*world, damaged), "nothing was refused");

@@ -3,51 +3,19 @@
 #include <scene/reader.hpp>
 #include <scene/scene.hpp>
 
+#include <fuzz.hpp>
 #include <io/temporary_folder.hpp>
 
 #include <gmock/gmock.h>
-
-#include <cstdlib>
-#include <random>
 
 namespace hooke::scene {
 namespace {
 
 constexpr Index kMostPointsToBuild = 3000;
-constexpr int kRounds = 4000;
 
-class Mutator {
+class Mutator : public test::Damage {
  public:
-  explicit Mutator(unsigned seed) : random_(seed) {}
-
-  std::size_t below(std::size_t n) { return std::uniform_int_distribution<std::size_t>(0, n - 1)(random_); }
-
-  // Bytes changed, cut, doubled or swapped for something that hurts.
-  std::string bytes(std::string text) {
-    for (std::size_t i = 0, n = 1 + below(4); i < n && !text.empty(); ++i) {
-      const std::size_t at = below(text.size());
-      switch (below(6)) {
-        case 0:
-          text[at] = char(below(256));
-          break;
-        case 1:
-          text.erase(at, 1 + below(10));
-          break;
-        case 2:
-          text.insert(at, text.substr(below(text.size()), below(40)));
-          break;
-        case 3:
-          text.resize(at);
-          break;
-        case 4:
-          text.insert(at, 1, "[]{}\",:-.0e"[below(11)]);
-          break;
-        default:
-          text[at] = char(text[at] ^ char(1 << below(8)));
-      }
-    }
-    return text;
-  }
+  using Damage::Damage;
 
   // Some value of the tree replaced by one of another kind or size, dropped or doubled.
   void structure(Json& json) {
@@ -91,9 +59,6 @@ class Mutator {
                                           12345678901234567890u};
     *here = values[below(values.size())];
   }
-
- private:
-  std::mt19937 random_;
 };
 
 Index points_of(const SceneDescription& scene) {
@@ -135,9 +100,7 @@ bool survives(const std::string& text) {
 }
 
 TEST(Fuzz, MutatedScenesAreReadOrRefused) {
-  const char* const given = std::getenv("HOOKE_SEED");
-  const unsigned seed = given ? unsigned(std::strtoul(given, nullptr, 10)) : std::random_device()();
-  std::printf("HOOKE_SEED=%u\n", seed);
+  const std::uint64_t seed = test::fuzz_seed();
   SCOPED_TRACE("HOOKE_SEED=" + std::to_string(seed));
   std::vector<std::string> texts{
       R"({"hooke": 1, "damping": 0.1, "bodies": [
@@ -164,11 +127,12 @@ TEST(Fuzz, MutatedScenesAreReadOrRefused) {
   for (const auto& entry : std::filesystem::directory_iterator(HOOKE_SCENES_FOLDER))
     if (entry.path().extension() == ".json") texts.push_back(test::contents(entry.path()));
   Mutator mutator(seed);
+  const int rounds = test::fuzz_rounds(4000);
   int scenes = 0;
-  for (int round = 0; round < kRounds; ++round) {
+  for (int round = 0; round < rounds; ++round) {
     const std::string& text = texts[mutator.below(texts.size())];
     if (round % 2) {
-      scenes += survives(mutator.bytes(text));
+      scenes += survives(mutator(text, "[]{}\",:-.0e"));
     } else {
       Json json = Json::parse(text);
       for (std::size_t i = 0, n = 1 + mutator.below(3); i < n; ++i) mutator.structure(json);
@@ -177,8 +141,8 @@ TEST(Fuzz, MutatedScenesAreReadOrRefused) {
     if (HasFailure()) break;
   }
   // Neither is everything refused nor everything taken.
-  EXPECT_GT(scenes, kRounds / 100);
-  EXPECT_LT(scenes, kRounds * 9 / 10);
+  EXPECT_GT(scenes, rounds / 100);
+  EXPECT_LT(scenes, rounds / 10 * 9);
 }
 
 }  // namespace

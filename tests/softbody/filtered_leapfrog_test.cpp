@@ -1,6 +1,7 @@
 // Filtered leapfrog against velocity Verlet with small steps, against dense algebra, and against what
 // leapfrog with another inertia must keep.
 #include "core/problems.hpp"
+#include "softbody/sheet.hpp"
 
 #include <hooke/softbody/filtered_grid.hpp>
 #include <hooke/softbody/soft_body.hpp>
@@ -13,29 +14,12 @@ namespace {
 
 using namespace softbody;
 
+using test::sheet;
+
 const Vec3 kGravity{0, -9.81, 0};
 
 template <class S>
 constexpr Precision kPrecision = std::is_same_v<S, float> ? Precision::Float : Precision::Double;
-
-// The hanging sheet: equal masses, fixed constants, tilted by 45°, first row held.
-SoftBodySettings sheet(int n, double softness = 1) {
-  ClothMaterial any;
-  any.stretch = any.shear = any.bend = 1;
-  Cloth cloth = cloth_from_grid(1, 1, n, n, {1, 0, 0}, {0, -1, 1}, any);
-  auto network = std::make_shared<SpringNetwork>(*cloth.network);
-  for (Spring& spring : network->springs) {
-    spring.stiffness = spring.family == Family::Stretch ? 500 : spring.family == Family::Shear ? 100 : 5;
-    spring.stiffness *= softness;
-    spring.damping = 0;
-  }
-  cloth.network = std::move(network);
-  cloth.masses.setConstant(0.3 / (n * n));
-  SoftBodySettings settings = settings_of(cloth);
-  for (int i = 0; i < n; ++i) settings.pins.push_back(i);
-  settings.precision = Precision::Double;
-  return settings;
-}
 
 SoftBodySettings filtered(SoftBodySettings settings, double dt) {
   settings.motion.method = &filtered_leapfrog();
@@ -357,7 +341,7 @@ TYPED_TEST(Filtered, KeepsTheFilterWhereSpringsAreAdded) {
   settings.precision = kPrecision<S>;
   Play alone(settings), more(settings);
   auto& body = dynamic_cast<PointBody<S>&>(*more.body);
-  const SoftBodySettings faint = sheet(24, 1e-9);
+  const SoftBodySettings faint = sheet(24, true, 1e-9);
   body.add_field(std::make_unique<SpringField<S>>(faint.network, body.state().position));
   alone.ticks(10, 1e-2), more.ticks(10, 1e-2);
   EXPECT_LT(rms(more.body->positions(), alone.body->positions()), 1e-6);

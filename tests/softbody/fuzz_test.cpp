@@ -4,10 +4,11 @@
 #include <hooke/softbody/xpbd.hpp>
 #include <hooke/world.hpp>
 
+#include <fuzz.hpp>
+
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <cstdlib>
 #include <random>
 
 namespace hooke::softbody {
@@ -141,10 +142,7 @@ void play(std::uint64_t seed) {
 }
 
 TEST(Fuzz, OfWorldsNeverGoesWrongSilently) {
-  const char* wanted = std::getenv("HOOKE_FUZZ");
-  const char* given = std::getenv("HOOKE_SEED");
-  const std::uint64_t first = given ? std::strtoull(given, nullptr, 10) : std::random_device{}();
-  const std::uint64_t count = wanted ? std::strtoull(wanted, nullptr, 10) : 2000;
+  const std::uint64_t first = test::fuzz_seed(), count = std::uint64_t(test::fuzz_rounds(2000));
   for (std::uint64_t seed = first; seed < first + count; ++seed) {
     SCOPED_TRACE("HOOKE_SEED=" + std::to_string(seed) + " HOOKE_FUZZ=1");
     ASSERT_NO_THROW(play(seed));

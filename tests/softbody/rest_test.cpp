@@ -4,6 +4,8 @@
 #include <hooke/softbody/xpbd.hpp>
 #include <hooke/world.hpp>
 
+#include "softbody/sheet.hpp"
+
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -160,6 +162,45 @@ TEST(Rest, IsNotForWhatLosesNoEnergy) {
   ASSERT_TRUE(world.update(5).good());
   EXPECT_LT(rms_speed(body), 1e-4);
   EXPECT_FALSE(body.asleep());
+}
+
+// The rounding of lengths alone shook it for ever.
+TEST(Rest, OfASheetInFloatIsThatInDouble) {
+  SoftBodySettings settings = test::sheet(32);
+  settings.precision = Precision::Float;
+  World world;
+  world.set_damping(0.63);
+  Body& body = world.add(make_soft_body(settings));
+  ASSERT_TRUE(world.update(20).good());
+  EXPECT_TRUE(body.asleep()) << rms_speed(body);
+  EXPECT_LT(residual(body, world.gravity()), 0.01 * body.total_mass() * 9.81);
+}
+
+// A mass that begins at full speed and a soft one far below it: at nine tenths of the largest stable step the energy
+// of the fast one swings by several times itself.
+TEST(AutomaticStep, KeepsTheEnergyOfWhatNothingDamps) {
+  SoftBodySettings settings;
+  settings.positions = Points<double>::Zero(3, 3);
+  settings.positions(1, 0) = 1, settings.positions(2, 0) = 2;
+  settings.velocities = Points<double>::Zero(3, 3);
+  settings.velocities(1, 0) = 1;
+  settings.masses = Values<double>::Ones(3);
+  settings.pins = {0};
+  auto network = std::make_shared<SpringNetwork>();
+  network->springs.push_back({0, 1, 1e5, 0, 1});
+  network->springs.push_back({1, 2, 10, 0, 1});
+  settings.network = network;
+  World world;
+  world.enable_gravity(false);
+  world.add(make_soft_body(settings));
+  const double start = world.energy().total();
+  double most = start, least = start;
+  for (int tick = 0; tick < 240; ++tick) {
+    ASSERT_TRUE(world.update(world.clock().tick()).good());
+    most = std::max(most, world.energy().total()), least = std::min(least, world.energy().total());
+  }
+  EXPECT_LT(most, (1 + 1e-3) * start);
+  EXPECT_GT(least, (1 - 1e-3) * start);
 }
 
 // A block on a slope that friction holds does not creep.

@@ -1,6 +1,7 @@
 // Small-step XPBD: stiffness in N/m whatever the iterations, nothing lost to float, rest that is rest, and
 // bounded where others break.
 #include "core/problems.hpp"
+#include "softbody/sheet.hpp"
 
 #include <hooke/softbody/lattice.hpp>
 #include <hooke/softbody/soft_body.hpp>
@@ -13,30 +14,13 @@ namespace {
 
 using namespace softbody;
 
+using test::sheet;
+
 const Vec3 kGravity{0, -9.81, 0};
 constexpr double kFrame = 1.0 / 60;
 
 template <class S>
 constexpr Precision kPrecision = std::is_same_v<S, float> ? Precision::Float : Precision::Double;
-
-// The hanging sheet: equal masses, fixed constants, first row held; tilted by 45° or vertical.
-SoftBodySettings sheet(int n, bool tilted, double stiffness = 1) {
-  ClothMaterial any;
-  any.stretch = any.shear = any.bend = 1;
-  Cloth cloth = cloth_from_grid(1, 1, n, n, {1, 0, 0}, {0, -1, tilted ? 1.0 : 0.0}, any);
-  auto network = std::make_shared<SpringNetwork>(*cloth.network);
-  for (Spring& spring : network->springs) {
-    spring.stiffness = spring.family == Family::Stretch ? 500 : spring.family == Family::Shear ? 100 : 5;
-    spring.stiffness *= stiffness;
-    spring.damping = 0;
-  }
-  cloth.network = std::move(network);
-  cloth.masses.setConstant(0.3 / (n * n));
-  SoftBodySettings settings = settings_of(cloth);
-  for (int i = 0; i < n; ++i) settings.pins.push_back(i);
-  settings.precision = Precision::Double;
-  return settings;
-}
 
 // A chain that hangs from point 0, which is held; the last mass may be another.
 SoftBodySettings chain(int links, double stiffness, double mass, double length, double last) {

@@ -37,8 +37,7 @@ HOOKE_INLINE void spring_loop(SpringBlock<S>& s) {
   HOOKE_INDEPENDENT
   for (int i = 0; i < n; ++i) {
     T dx = T(bx[i]) - T(ax[i]), dy = T(by[i]) - T(ay[i]), dz = T(bz[i]) - T(az[i]);
-    if constexpr (fine)
-      dx += T(lbx[i]) - T(lax[i]), dy += T(lby[i]) - T(lay[i]), dz += T(lbz[i]) - T(laz[i]);
+    if constexpr (fine) dx += T(lbx[i]) - T(lax[i]), dy += T(lby[i]) - T(lay[i]), dz += T(lbz[i]) - T(laz[i]);
     const T l2 = dx * dx + dy * dy + dz * dz;
     const T root = std::sqrt(l2);
     const T l = root > kTiny<T> ? root : kTiny<T>;

@@ -185,14 +185,10 @@ class XpbdBody final : public PointBody<S> {
   void settle(Points<S>& v) override {
     Base::settle(v);
     for (std::size_t i = 0; i < planes_.size(); ++i) {
+      if (!(contacts_[i].pushed > 0)) continue;
       const ContactPlane<S>& plane = planes_[i];
-      Vec value = v.row(plane.point).matrix().transpose();
-      const S pressing = -plane.normal.dot(value);
-      if (!(contacts_[i].pushed > 0 && pressing > 0)) continue;
-      value += pressing * plane.normal;
-      const S along = value.norm();
-      if (along > 0) value *= std::max(S(0), 1 - plane.friction * pressing / along);
-      v.row(plane.point) = value.transpose().array();
+      Vec value = row(v, plane.point);
+      if (rub<S>(plane.normal, plane.friction, value) > 0) set_row<S>(v, plane.point, value);
     }
   }
 
