@@ -1,7 +1,7 @@
 // Measures Hooke against a yardstick, against its own size and against its own features.
 // What it shows and how to read it: docs/benchmarks.md.
 //
-//   speed_bench [--quick] [--out FOLDER] [CASE...]    CASE: kernel accuracy threads size features filtered
+//   speed_bench [--quick] [--out FOLDER] [CASE...]    CASE: kernel accuracy threads size features checks filtered
 //                                                   particles particle-modules
 #include "particles.hpp"
 #include "rounds.hpp"
@@ -11,7 +11,9 @@
 #include <hooke/error.hpp>
 #include <hooke/io/output_file.hpp>
 #include <hooke/method.hpp>
+#include <hooke/point_body.hpp>
 #include <hooke/softbody/filtered_leapfrog.hpp>
+#include <hooke/softbody/lattice.hpp>
 
 #include <algorithm>
 #include <cmath>
@@ -513,6 +515,82 @@ Table filtered(const Effort& effort) {
   return table;
 }
 
+// 7. What every tick is looked at for: numbers that are not finite, energy from nowhere, rest.
+Table checks(const Effort& effort) {
+  struct Case {
+    std::string name;
+    SoftBodySettings body;
+    double damping = 0;
+  };
+  std::vector<Case> cases;
+  for (const int n : {16, 32, 64, 128}) {
+    SoftBodySettings sheet = hanging_sheet(n);
+    sheet.motion.method = &velocity_verlet();
+    for (const Precision precision : {Precision::Float, Precision::Double}) {
+      sheet.precision = precision;
+      const std::string name = std::to_string(n) + " x " + std::to_string(n) + ", ";
+      cases.push_back({name + (precision == Precision::Float ? "float" : "double"), sheet});
+    }
+  }
+  softbody::FixedLatticeMaterial jelly;
+  jelly.stiffness = 2000;
+  cases.push_back({"jelly, 10 x 10 x 10, damped, float",
+                   softbody::settings_of(softbody::lattice_from_box({0.2, 0.2, 0.2}, {10, 10, 10}, jelly))});
+  cases.back().body.precision = Precision::Float;
+  Table table("checks",
+              "What every tick is looked at for: bodies in the air at their automatic step, 240 ticks a second, one "
+              "thread",
+              {"body", "substeps a tick", "microseconds a tick", "one pass over the velocities [microseconds]",
+               "share of a tick", "times the cost without watches and sleep (median of rounds)"});
+  for (const Case& each : cases) {
+    const int ticks = std::max(2, 64 * 1024 / int(each.body.positions.rows()));
+    const auto world_of = [&](bool looks) {
+      auto world = std::make_unique<World>(kTickRate);
+      SoftBodySettings settings = each.body;
+      settings.motion.sleeps = settings.motion.watches_energy = looks;
+      world->add(softbody::make_soft_body(settings));
+      world->update(0.1);  // the start of a motion is looked at more often
+      return world;
+    };
+    const auto looks = world_of(true), blind = world_of(false);
+    const auto run = [&](World& world) {
+      return Contender{[&world, ticks] {
+                         const double begin = cpu_seconds();
+                         world.update(ticks / kTickRate * (1 + 1e-9));
+                         return (cpu_seconds() - begin) / ticks;
+                       },
+                       {}};
+    };
+    const auto pass = [&](const auto& body) {
+      return Contender{[&body, ticks] {
+                         double sum = 0;
+                         const double begin = cpu_seconds();
+                         for (int i = 0; i < 8 * ticks; ++i) {
+                           sum += body.state().kinetic_energy();
+                           asm volatile("" : : "g"(&sum) : "memory");
+                         }
+                         return (cpu_seconds() - begin) / (8 * ticks);
+                       },
+                       {}};
+    };
+    const Body& body = *looks->bodies()[0];
+    const auto* single = dynamic_cast<const PointBody<float>*>(&body);
+    std::vector<Contender> turns{run(*looks), run(*blind),
+                                 single ? pass(*single) : pass(dynamic_cast<const PointBody<double>&>(body))};
+    take_turns(turns, effort.rounds());
+    table.add({each.name,
+               int(body.motion_facts().substeps),
+               {1e6 * turns[0].least(), "%.2f"},
+               {1e6 * turns[2].least(), "%.3f"},
+               {turns[2].least() / turns[0].least(), "%.4f"},
+               {1 / times_faster(turns[0], turns[1]).median, "%.3f"}});
+  }
+  table.note(
+      "The pass finds what is not finite, tells rest and whether energy must be looked at; it is made whether watches "
+      "are on or off.");
+  return table;
+}
+
 struct NamedCase {
   const char* name;
   Table (*measure)(const Effort&);
@@ -523,6 +601,7 @@ constexpr NamedCase kCases[] = {
     {"threads", threads},
     {"size", size},
     {"features", features},
+    {"checks", checks},
     {"filtered", filtered},
     {"particles", [](const Effort& effort) { return particle_pipeline(effort.quick); }},
     {"particle-modules", [](const Effort& effort) { return particle_modules(effort.quick); }}};
