@@ -165,8 +165,8 @@ bool strains_of(scene::Scene& scene, Row& row, double split, double until, doubl
   return watch.run(until);
 }
 
-// By a method of order 6 in double, its steps halved until the strain moves by less than a hundredth.
-double converged_strain(const SceneDescription& d, double until) {
+// By a method of order 6 in double, its steps halved until the strain moves by less than this share.
+double converged_strain(const SceneDescription& d, double until, double share_off) {
   double before = -1;
   for (double share = 0.9;; share /= 2) {
     Solver solver;
@@ -178,7 +178,7 @@ double converged_strain(const SceneDescription& d, double until) {
     Row row;
     Strains strains;
     strains_of(scene, row, until, until, kAnyWork, strains);
-    if (before > 0 && std::abs(strains.early / before - 1) < 0.01) return strains.early;
+    if (before > 0 && std::abs(strains.early / before - 1) < share_off) return strains.early;
     before = strains.early;
     if (share < 0.05) return kNone;
   }
@@ -197,7 +197,7 @@ Case hard_bar(const char* name, const char* title, const char* problem, const ch
   hard.gate = gate;
   // Stiff and heavy at once, the reference takes minutes.
   (stiffness > 1 && ratio > 1 ? hard.thorough : hard.parameters) = {""};
-  const auto wanted = once<double>([=] { return converged_strain(hard_sheet(kHardPoints, stiffness, ratio), until); });
+  const auto wanted = once<double>([=] { return converged_strain(hard_sheet(kHardPoints, stiffness, ratio), until, 0.1 * allowed); });
   hard.run = [=](const Trial& trial, Row& row) {
     scene::Scene scene = build(hard_sheet(kHardPoints, stiffness, ratio), trial.solver);
     Strains strains;

@@ -62,7 +62,7 @@ Case rest() {
   hard.run = [](const Trial& trial, Row& row) {
     const Resting resting = stability::resting(trial.parameter, trial.thorough);
     scene::Scene scene = build(resting.scene, trial.solver);
-    Watch watch(scene.world, row, 10, allowance(trial));
+    Watch watch(scene.world, row, 10, allowance(trial, 3));
     double moving = 0;
     watch.look = [&] {
       if (rms_speed(scene.world) >= kStill) moving = scene.world.time();

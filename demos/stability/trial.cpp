@@ -124,6 +124,7 @@ double Watch::work() const {
 
 // Explicit methods tell beforehand how many steps they need.
 bool Watch::refuse_if_too_dear(double seconds) {
+  if (asleep(world_)) return false;
   double sum = 0;
   for (const auto& body : world_.bodies()) {
     const MotionFacts facts = body->motion_facts();
@@ -159,7 +160,7 @@ void Watch::listen(const StepReport& report) {
   const std::string text = report.text();
   if (row_.said.find(text) == std::string::npos && row_.said.size() < 400)
     row_.said += (row_.said.empty() ? "" : "; ") + text;
-  if (std::isnan(told_at) && text.find("largest stable") != std::string::npos) told_at = report.time;
+  if (std::isnan(told_at) && report.status == StepReport::Status::StepTooLong) told_at = report.time;
 }
 
 bool Watch::run(double until) {

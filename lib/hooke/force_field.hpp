@@ -29,6 +29,9 @@ class ForceField {
   /// drag. Only bodies of such fields sleep, and only their energy is watched.
   virtual bool passive() const { return false; }
 
+  /// True where only differences of places matter: the origin of a body of such fields may follow it.
+  virtual bool anywhere() const { return false; }
+
   /// f += force [N]. x [m] is relative to the body's origin, v [m/s], t [s]; shapes (n, 3).
   virtual void add_force(const Points<S>& x, const Points<S>& v, double t, Points<S>& f) const = 0;
 
@@ -71,6 +74,7 @@ class LinearDrag final : public ForceField<S> {
  public:
   /// @param coefficient [N·s/m], >= 0
   explicit LinearDrag(double coefficient);
+  bool anywhere() const override { return true; }
   bool passive() const override { return true; }
   bool uses_velocity() const override { return true; }
   void add_force(const Points<S>& x, const Points<S>& v, double t, Points<S>& f) const override;
@@ -89,6 +93,7 @@ class QuadraticDrag final : public ForceField<S> {
  public:
   /// @param coefficient [N·s²/m²], >= 0
   explicit QuadraticDrag(double coefficient);
+  bool anywhere() const override { return true; }
   bool passive() const override { return true; }
   bool uses_velocity() const override { return true; }
   void add_force(const Points<S>& x, const Points<S>& v, double t, Points<S>& f) const override;
@@ -106,6 +111,7 @@ template <class S>
 class TimeForce final : public ForceField<S> {
  public:
   explicit TimeForce(std::function<Vec3(double t)> force);
+  bool anywhere() const override { return true; }
   bool uses_velocity() const override { return false; }
   void add_force(const Points<S>& x, const Points<S>& v, double t, Points<S>& f) const override;
 

@@ -72,6 +72,7 @@ LinearBodies<S>::LinearBodies(std::string name, const std::vector<LinearBody>& b
       bodies_(bodies),
       rest_speed_(rest_speed) {
   if (!(rest_speed >= 0)) throw std::invalid_argument("LinearBodies: rest_speed must not be negative");
+  this->may_follow_ = false;  // each flies its own way
 }
 
 template <class S>

@@ -26,6 +26,8 @@ constexpr double kSlow = 256;
 // exchanges. It is looked at this often [s].
 constexpr double kSwing = 8e-4;
 constexpr double kSwingInterval = 0.25;
+// Bodies are not taken to be smaller where their origin follows them [m].
+constexpr double kLeastSize = 1e-2;
 // Methods without a stable step still need one: ω h of this.
 constexpr double kUnstablePhase = 0.05;
 
@@ -57,12 +59,14 @@ PointBody<S>::PointBody(std::string name, PointMasses<S> points, MotionSettings 
   if (!(settings_.tolerance > 0) || !std::isfinite(settings_.tolerance)) fail("tolerance must be positive");
   if (settings_.retries < 0) fail("retries must not be negative");
   start_ = previous_position_ = points_.position;
+  start_origin_ = points_.origin;
   previous_velocity_ = points_.velocity;
 }
 
 template <class S>
 void PointBody<S>::add_field(std::unique_ptr<const ForceField<S>> field) {
   passive_ = passive_ && field->passive();
+  may_follow_ = may_follow_ && field->anywhere();
   wake();
   if (field->once_a_tick()) {
     held_fields_.push_back(std::move(field));
@@ -557,11 +561,33 @@ StepReport PointBody<S>::try_tick() {
   return {};
 }
 
+// In float what is far from its origin has lost digits: springs of a net that flew 200 m gained energy from the
+// rounding of places. So the origin goes after it, by multiples of a power of two that is no less than four times its
+// size and no more than the way of any of its points: differences that float holds exactly, so no point moves.
+template <class S>
+void PointBody<S>::follow() {
+  if (!std::is_same_v<S, float> || !may_follow_) return;
+  const double far = double(points_.position.row(0).abs().maxCoeff());
+  if (far <= known_reach_) return;
+  const Vec3 low = points_.position.colwise().minCoeff().matrix().transpose().template cast<double>();
+  const Vec3 high = points_.position.colwise().maxCoeff().matrix().transpose().template cast<double>();
+  const double step = std::exp2(std::ceil(std::log2(4 * std::max((high - low).maxCoeff(), kLeastSize))));
+  Vec3 way;
+  for (int k = 0; k < 3; ++k) way[k] = std::trunc((low[k] + high[k]) / 2 / step) * step;
+  known_reach_ = 2 * std::max(far, step);
+  if (way.isZero(0) || !(way.cwiseAbs().maxCoeff() < 1e6 * step)) return;
+  for (int k = 0; k < 3; ++k) points_.position.col(k) -= S(way[k]);
+  points_.origin += way;
+  integrator_.drop_low();
+  known_reach_ = 2 * step;
+}
+
 template <class S>
 StepReport PointBody<S>::advance(const Tick& tick) {
   if (asleep_ && !disturbed(tick)) return {};
   if (asleep_) wake();
   tick_ = tick;
+  if (size() > 0) follow();
   previous_position_ = points_.position;
   previous_velocity_ = points_.velocity;
   if (size() == 0) return {};
@@ -813,6 +839,8 @@ template <class S>
 void PointBody<S>::save(CheckpointWriter& out) const {
   out.begin("points");
   out.add(points_.origin);
+  out.add(start_origin_);
+  out.add(known_reach_);
   for (const Points<S>* p : {&points_.position, &points_.velocity, &start_, &previous_position_, &previous_velocity_})
     out.add(*p);
   out.add(points_.inverse_mass);
@@ -870,6 +898,8 @@ void PointBody<S>::load(CheckpointReader& in) {
   const Index n = size();
   in.begin("points");
   in.array("origin", points_.origin, 3);
+  in.array("origin at the start", start_origin_, 3);
+  known_reach_ = in.number<double>("reach", 0);
   in.array("position", points_.position, n);
   in.array("velocity", points_.velocity, n);
   in.array("start", start_, n);

@@ -50,6 +50,7 @@ class PointBody : public Body, protected Dynamics<S> {
   /// Adds a force field. Order of addition is order of summation.
   void add_field(std::unique_ptr<const ForceField<S>> field);
 
+  /// In float the origin follows a body that travels: what `state` says is relative to where it is now.
   const PointMasses<S>& state() const { return points_; }
   const MotionSettings& settings() const { return settings_; }
   /// Rest: for so long [s] its RMS speed was below this [m/s], and of its forces, Σ |f_i| over its points, what
@@ -79,7 +80,9 @@ class PointBody : public Body, protected Dynamics<S> {
   Points<double> velocities() const override { return points_.velocity.template cast<double>(); }
   Values<double> masses() const override { return points_.mass.template cast<double>(); }
   Points<double> positions_between(double fraction) const override;
-  Points<double> start_positions() const override { return world(start_); }
+  Points<double> start_positions() const override {
+    return start_.template cast<double>().rowwise() + start_origin_.transpose().array();
+  }
   void set_position(Index point, const Vec3& position) override;
   void set_velocity(Index point, const Vec3& velocity) override;
   void pin(Index point) override;
@@ -134,6 +137,7 @@ class PointBody : public Body, protected Dynamics<S> {
   bool other_forces() const { return !fields_.empty() || pushing_; }
   Points<double> world(const Points<S>& p) const;
 
+  bool may_follow_ = true;  // its origin it
   PointMasses<S> points_;
   Tick tick_;  // the one being simulated
 
@@ -158,6 +162,7 @@ class PointBody : public Body, protected Dynamics<S> {
   double automatic_step() const;
   void choose_substeps(const Tick& tick);
   void bound_swing(const Tick& tick);
+  void follow();
   void spend_bank(double seconds);
   void hold_fields(double t);
   void hold(Index point);

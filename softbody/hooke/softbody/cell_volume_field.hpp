@@ -27,6 +27,7 @@ class CellVolumeField final : public ForceField<S> {
   std::vector<double> volumes(const Points<S>& x) const;
 
   bool uses_velocity() const override { return false; }
+  bool anywhere() const override { return true; }
   bool passive() const override { return true; }
   void add_force(const Points<S>& x, const Points<S>& v, double t, Points<S>& f) const override;
   void add_fine_force(const Points<S>& x, const Points<S>& low, const Points<S>& v, double t,

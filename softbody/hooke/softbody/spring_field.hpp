@@ -22,6 +22,7 @@ class SpringField final : public ForceField<S> {
   SpringField(std::shared_ptr<const SpringNetwork> network, const Points<S>& start, bool two_floats = false);
 
   bool uses_velocity() const override { return damped_; }
+  bool anywhere() const override { return true; }
   bool passive() const override { return true; }
   void add_force(const Points<S>& x, const Points<S>& v, double t, Points<S>& f) const override;
   void add_fine_force(const Points<S>& x, const Points<S>& low, const Points<S>& v, double t,

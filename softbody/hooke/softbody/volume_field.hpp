@@ -23,6 +23,7 @@ class VolumeField final : public ForceField<S> {
   double volume(const Points<S>& x) const;
 
   bool uses_velocity() const override { return false; }
+  bool anywhere() const override { return true; }
   bool passive() const override { return true; }
   void add_force(const Points<S>& x, const Points<S>& v, double t, Points<S>& f) const override;
   /// The change of pressure, κ/V₀ ∇V ∇Vᵀ, is never negative; `safe` leaves out the turning of the surface.

@@ -38,6 +38,7 @@ class WindField final : public ForceField<S> {
   WindField(const Wind& wind, const std::vector<Triangle>& triangles, Index point_count);
 
   bool uses_velocity() const override { return true; }
+  bool anywhere() const override { return true; }
   bool passive() const override { return wind_.velocity.isZero(0); }  // still air only takes energy
   bool once_a_tick() const override { return wind_.once_a_tick; }
   void add_force(const Points<S>& x, const Points<S>& v, double t, Points<S>& f) const override;
