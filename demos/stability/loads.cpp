@@ -197,7 +197,8 @@ Case hard_bar(const char* name, const char* title, const char* problem, const ch
   hard.gate = gate;
   // Stiff and heavy at once, the reference takes minutes.
   (stiffness > 1 && ratio > 1 ? hard.thorough : hard.parameters) = {""};
-  const auto wanted = once<double>([=] { return converged_strain(hard_sheet(kHardPoints, stiffness, ratio), until, 0.1 * allowed); });
+  const auto wanted =
+      once<double>([=] { return converged_strain(hard_sheet(kHardPoints, stiffness, ratio), until, 0.1 * allowed); });
   hard.run = [=](const Trial& trial, Row& row) {
     scene::Scene scene = build(hard_sheet(kHardPoints, stiffness, ratio), trial.solver);
     Strains strains;
