@@ -206,7 +206,9 @@ class PointBody : public Body, protected Dynamics<S> {
   double wanted_dt_ = 0, last_estimate_ = -1;
   double step_share_ = 1, swing_checked_ = -1, exchanged_ = 0;  // of the automatic step; [s]; [J]
   bool passive_ = true;                                         // all fields are
-  double free_mass_ = -1;                                       // [kg]; negative: to be summed up again
+  Vec3 start_origin_{0, 0, 0};
+  double known_reach_ = 0;  // while its first point is not farther from the origin, it stays where it is [m]
+  double free_mass_ = -1;   // [kg]; negative: to be summed up again
 
   bool asleep_ = false, damped_ = false;  // damped_: by the world, lately
   double quiet_since_ = 0;
