@@ -27,7 +27,7 @@ constexpr double kSlow = 256;
 constexpr double kSwing = 8e-4;
 constexpr double kSwingInterval = 0.25;
 // Bodies are not taken to be smaller where their origin follows them [m].
-constexpr double kLeastSize = 1e-2;
+constexpr double kLeastSize = 0.25;
 // Methods without a stable step still need one: ω h of this.
 constexpr double kUnstablePhase = 0.05;
 
@@ -704,12 +704,12 @@ bool PointBody<S>::alone() const {
   return settings_.watches_energy && passive_ && !pushing_ && !prescribes();
 }
 
-// [J], with heights from the body's own origin. Near the largest stable step the energy of a fast oscillation swings
+// [J], with heights from the origin it began with. Near the largest stable step the energy of a fast oscillation swings
 // by several times itself; what methods of first and second order keep of an oscillator, exactly, is added to:
 // -h²/8 |a|² with Verlet, h/2 a·v with semi-implicit Euler, per unit of mass.
 template <class S>
 double PointBody<S>::kept_energy() {
-  const double energy = this->energy(tick_.gravity).total() + free_mass() * tick_.gravity.dot(points_.origin);
+  const double energy = this->energy(tick_.gravity).total() + free_mass() * tick_.gravity.dot(start_origin_);
   const Method& method = *settings_.method;
   if (!method.symplectic || method.order > 2 || std::isinf(method.stability_limit)) return energy;
   const double h = (tick_.end - tick_.start) / double(std::max<Index>(substeps_, 1));

@@ -7,6 +7,7 @@
 #include "softbody/sheet.hpp"
 
 #include <gtest/gtest.h>
+#include <Eigen/Geometry>
 
 #include <cmath>
 
