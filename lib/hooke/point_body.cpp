@@ -432,7 +432,7 @@ void PointBody<S>::bound_swing(const Tick& tick) {
   const Energy energy = this->energy(tick.gravity);
   exchanged_ = std::max(exchanged_, energy.kinetic + energy.elastic + total_mass() * fall * fall / 2);
   if (swing <= kSwing * exchanged_) return;
-  step_share_ *= std::sqrt(kSwing / 2 * exchanged_ / swing);
+  step_share_ = std::min(step_share_, std::sqrt(kSwing / 2 * exchanged_ / swing) * h / automatic_step());
   last_estimate_ = -1;
   choose_substeps(tick);
 }

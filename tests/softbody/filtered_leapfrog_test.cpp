@@ -349,7 +349,7 @@ TYPED_TEST(Filtered, KeepsTheFilterWhereSpringsAreAdded) {
 }
 
 TEST(FilteredLeapfrog, TellsWhatAWantedErrorChanges) {
-  SoftBodySettings settings = filtered(sheet(64, 1000), 0);
+  SoftBodySettings settings = filtered(sheet(64, true, 1000), 0);
   settings.wanted_error = 1e-2;
   Play run(settings);
   const FilteredFacts facts = *filtered_facts(*run.body);
@@ -367,7 +367,7 @@ TEST(FilteredLeapfrog, TellsWhatAWantedErrorChanges) {
   soft.ticks(100, 5e-3);
   EXPECT_LT(rms(soft.body->positions(), exact), 1.2e-2);
   // Without a wanted error nothing is lowered.
-  Play kept(filtered(sheet(64, 1000), 0));
+  Play kept(filtered(sheet(64, true, 1000), 0));
   EXPECT_EQ(filtered_facts(*kept.body)->stiffness_scale, 1);
   EXPECT_NEAR(filtered_facts(*kept.body)->expected_error, 1e-2, 1e-6);
 }

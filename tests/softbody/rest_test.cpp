@@ -215,6 +215,7 @@ TEST(AutomaticStep, KeepsTheEnergyOfWhatNothingDamps) {
   network->springs.push_back({0, 1, 1e5, 0, 1});
   network->springs.push_back({1, 2, 10, 0, 1});
   settings.network = network;
+  settings.precision = Precision::Double;
   World world;
   world.enable_gravity(false);
   world.add(make_soft_body(settings));

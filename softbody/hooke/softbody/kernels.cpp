@@ -27,7 +27,12 @@ template <class S, bool damped, bool fine>
 HOOKE_INLINE void spring_loop(SpringBlock<S>& s) {
   using T = std::conditional_t<fine, double, S>;
   const S *ax = s.a[0], *ay = s.a[1], *az = s.a[2], *bx = s.b[0], *by = s.b[1], *bz = s.b[2];
-  const S *k = s.stiffness, *rest = s.rest, *rest2 = s.rest_squared;
+  const S *k = s.stiffness, *rest = s.rest;
+  const T* rest2;
+  if constexpr (fine)
+    rest2 = s.fine_rest_squared;
+  else
+    rest2 = s.rest_squared;
   const S *c = s.damping, *vax = s.va[0], *vay = s.va[1], *vaz = s.va[2], *vbx = s.vb[0], *vby = s.vb[1],
           *vbz = s.vb[2];
   const S *lax = s.low_a[0], *lay = s.low_a[1], *laz = s.low_a[2], *lbx = s.low_b[0], *lby = s.low_b[1],
@@ -46,9 +51,9 @@ HOOKE_INLINE void spring_loop(SpringBlock<S>& s) {
     if constexpr (damped) {
       // k (l² - L²) / (l (l + L)) + c v·d / l², over one denominator: one division instead of two.
       const T closing = (T(vbx[i]) - T(vax[i])) * dx + (T(vby[i]) - T(vay[i])) * dy + (T(vbz[i]) - T(vaz[i])) * dz;
-      scale = (T(k[i]) * (l2 - T(rest2[i])) * l + T(c[i]) * closing * sum) / (l * l * sum);
+      scale = (T(k[i]) * (l2 - rest2[i]) * l + T(c[i]) * closing * sum) / (l * l * sum);
     } else {
-      scale = T(k[i]) * (l2 - T(rest2[i])) / (l * sum);
+      scale = T(k[i]) * (l2 - rest2[i]) / (l * sum);
     }
     fx[i] = S(scale * dx);
     fy[i] = S(scale * dy);

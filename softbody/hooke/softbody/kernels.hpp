@@ -17,6 +17,7 @@ struct SpringBlock {
   const S *low_a[3], *low_b[3];
   const S *va[3], *vb[3];
   const S *stiffness, *rest, *rest_squared, *damping;
+  const double* fine_rest_squared;  // for what rounding has dropped
   S f[3][kBlock];
   S *sum_a[3], *sum_b[3];
 };

@@ -78,7 +78,7 @@ SpringField<S>::SpringField(std::shared_ptr<const SpringNetwork> network, const 
   sorted.insert(sorted.end(), loose.begin(), loose.end());
 
   const Index n = Index(sorted.size());
-  stiffness_.resize(n), rest_.resize(n), rest_squared_.resize(n), damping_.resize(n);
+  stiffness_.resize(n), rest_.resize(n), rest_squared_.resize(n), fine_rest_squared_.resize(n), damping_.resize(n);
   a_.resize(sorted.size()), b_.resize(sorted.size());
   for (Index i = 0; i < n; ++i) {
     const Spring& s = sorted[std::size_t(i)];
@@ -91,9 +91,13 @@ SpringField<S>::SpringField(std::shared_ptr<const SpringNetwork> network, const 
               dz = start(s.b, 2) - start(s.a, 2);
       rest_squared_[i] = dx * dx + dy * dy + dz * dz;
       rest_[i] = std::sqrt(rest_squared_[i]);
+      const double x = double(start(s.b, 0)) - double(start(s.a, 0)), y = double(start(s.b, 1)) - double(start(s.a, 1)),
+                   z = double(start(s.b, 2)) - double(start(s.a, 2));
+      fine_rest_squared_[i] = x * x + y * y + z * z;
     } else {
       rest_[i] = S(s.rest_length);
       rest_squared_[i] = rest_[i] * rest_[i];
+      fine_rest_squared_[i] = double(rest_[i]) * double(rest_[i]);
     }
   }
 }
@@ -118,6 +122,7 @@ void SpringField<S>::add_forces(const Points<S>& x, const Points<S>* low, const 
     block.stiffness = stiffness_.data() + first;
     block.rest = rest_.data() + first;
     block.rest_squared = rest_squared_.data() + first;
+    block.fine_rest_squared = fine_rest_squared_.data() + first;
     block.damping = damped_ ? damping_.data() + first : nullptr;
   };
   for (const Run& run : runs_) {

@@ -57,6 +57,7 @@ class SpringField final : public ForceField<S> {
   std::vector<Run> runs_;
   Index loose_ = 0;  // springs from here on are in no run
   std::vector<int> a_, b_;
+  Values<double> fine_rest_squared_;
   Values<S> stiffness_, rest_, rest_squared_, damping_;
   // Scratch of rate_bounds; a field belongs to one body and is asked by one thread at a time.
   mutable Eigen::Array<S, Eigen::Dynamic, 6> bound_sums_, damping_sums_;
