@@ -23,9 +23,10 @@ constexpr double kStepCheckInterval = 0.25;
 // compensated.
 constexpr double kSlow = 256;
 // The automatic step of undamped bodies keeps the swing of their energy below this share of what their motion
-// exchanges. It is looked at this often [s].
+// exchanges. It is looked at this often to begin with, and later whenever twice the time has passed, at least this
+// often [s].
 constexpr double kSwing = 8e-4;
-constexpr double kSwingInterval = 0.25;
+constexpr double kSwingInterval = 0.25, kLongestSwingInterval = 2;
 // Bodies are not taken to be smaller where their origin follows them [m].
 constexpr double kLeastSize = 0.25;
 // Methods without a stable step still need one: ω h of this.
@@ -414,7 +415,8 @@ void PointBody<S>::bound_swing(const Tick& tick) {
   const Method& method = *settings_.method;
   if (settings_.dt > 0 || !method.symplectic || method.order != 2 || std::isinf(method.stability_limit)) return;
   if (!alone() || fields_.empty() || loses_energy()) return;
-  if (swing_checked_ >= 0 && tick.start - swing_checked_ < kSwingInterval * (1 - 1e-9)) return;
+  const double interval = std::clamp(swing_checked_, kSwingInterval, kLongestSwingInterval);
+  if (swing_checked_ >= 0 && tick.start - swing_checked_ < interval * (1 - 1e-9)) return;
   swing_checked_ = tick.start;
   const double h = (tick.end - tick.start) / double(substeps_);
   Points<S> a(size(), 3);
