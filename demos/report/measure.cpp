@@ -5,6 +5,7 @@
 #include <hooke/error.hpp>
 #include <hooke/method.hpp>
 #include <hooke/softbody/filtered_leapfrog.hpp>
+#include <hooke/softbody/xpbd.hpp>
 
 #include <algorithm>
 #include <cmath>
@@ -139,12 +140,14 @@ Solver solver_of(const Method& method, Precision precision, double dt) {
   return solver;
 }
 
-// Every method in every precision that takes the scene. The first level is twice the limit, where it should fail.
+// Every method in every precision that takes the scene. The first level is twice the limit, where it should fail, or
+// one step a tick where there is no limit.
 std::vector<Series> contenders(const StandardScene& scene, const Scales& scales, double size,
                                std::vector<std::string>& notes) {
   std::vector<Series> out;
   std::vector<const Method*> every(methods().begin(), methods().end());
   every.push_back(&softbody::filtered_leapfrog());  // for grids alone
+  every.push_back(&softbody::xpbd());               // for soft bodies alone
   for (const Method* method : every)
     for (const auto& entry : kPrecisions) {
       const Precision precision = entry.first;

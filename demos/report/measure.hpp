@@ -21,7 +21,7 @@ struct Row {
   double rms = 0, worst = 0;  ///< error at the scene's end, over points [m]
   double energy_drift = 0;    ///< worst |E - E(0)| over the greatest kinetic energy
   double momentum_drift = 0;  ///< worst |P - P(0) - M g t| over √(2 M · greatest kinetic energy)
-  double evaluations = 0;     ///< of all forces, products of implicit solves included
+  double evaluations = 0;     ///< of all forces, products of implicit solves included; sweeps of XPBD
   std::string status = "ok";  ///< or "blow-up", "not converged"
   bool ok() const { return status == "ok"; }
 };

@@ -119,10 +119,11 @@ std::string set_up(const SceneReport& report) {
   std::string names;
   for (const auto& precision : precisions) names += (names.empty() ? "" : ", ") + precision;
   const auto& scene = report.scene;
-  std::string out = "<p>" + std::to_string(methods.size()) + " methods in " + escaped(names) + ", " +
-                    std::to_string(report.rows.size()) +
-                    " runs: from twice the largest stable step down by factors of 2, in " +
-                    std::to_string(scene.ticks) + " ticks. One thread, processor time, least of repeats. ";
+  std::string out =
+      "<p>" + std::to_string(methods.size()) + " methods in " + escaped(names) + ", " +
+      std::to_string(report.rows.size()) +
+      " runs: from twice the largest stable step, or a tick where any is stable, down by factors of 2, in " +
+      std::to_string(scene.ticks) + " ticks. One thread, processor time, least of repeats. ";
   if (!by_points(report))
     out +=
         "Contacts make single points chaotic: the centre of all points and their spread along x, y, z are compared "

@@ -105,6 +105,7 @@ bool have_gnuplot() {
 
 std::string color_of(const std::string& method) {
   if (method == "filtered-leapfrog") return "#7fcf00";
+  if (method == "xpbd") return "#ff00aa";
   if (method == "yardstick") return "#000000";
   if (method == "bullet-classic") return "#a0522d";
   std::size_t i = 0;

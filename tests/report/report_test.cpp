@@ -7,6 +7,7 @@
 #include <gmock/gmock.h>
 
 #include <cmath>
+#include <set>
 
 namespace hooke::report {
 namespace {
@@ -92,6 +93,28 @@ TEST(Measure, HasARowForEveryMethodAndPrecisionWithFiniteNumbers) {
   EXPECT_EQ(report.reference.uncertainty(), 0) << "a closed form";
 }
 
+TEST(Measure, HasRowsOfXpbdAndBackwardEulerFromCoarseSteps) {
+  const StandardScene scene = named("elastic-pendulum");
+  const double tick = scene.duration / scene.ticks;
+  const SceneReport report = measure(scene, {0.5, 0.001}, [](double) {});
+  for (const char* method : {"xpbd", "implicit-euler"})
+    for (const char* precision : {"float", "double"}) {
+      double coarsest = 0, finest = tick, first = 0, least = 1e300;
+      for (const Row& row : report.rows) {
+        if (row.method != method || row.precision != precision || !row.ok()) continue;
+        if (row.dt > coarsest) coarsest = row.dt, first = row.rms;
+        finest = std::min(finest, row.dt), least = std::min(least, row.rms);
+      }
+      EXPECT_NEAR(coarsest, tick, 1e-12) << method << " " << precision;
+      EXPECT_LT(finest, 1.0 / 1200) << method << " " << precision;
+      EXPECT_LT(least, 0.3 * first) << method << " " << precision;
+    }
+  std::set<std::string> colors;
+  for (const char* method : {"xpbd", "implicit-euler", "filtered-leapfrog", "velocity-verlet", "yardstick"})
+    colors.insert(color_of(method));
+  EXPECT_EQ(colors.size(), 5u);
+}
+
 TEST(Measure, ErrorsFallAtTheMethodsOrder) {
   const SceneReport report = measure(named("elastic-pendulum"), {0.5, 0.001}, [](double) {});
   double before = 0, slope = 0;
@@ -121,6 +144,7 @@ TEST(Measure, RefusalsAreTold) {
   const SceneReport report = measure(named("throw-linear-drag"), {0.2, 0.001}, [](double) {});
   EXPECT_THAT(report.notes, Contains(HasSubstr("pefrl in double: ")));
   for (const Row& row : report.rows) EXPECT_NE(row.method, "pefrl");
+  EXPECT_THAT(measure(named("ship"), {0.2, 0.001}, [](double) {}).notes, Contains(HasSubstr("xpbd in double: ")));
 }
 
 Row made(const char* method, double seconds, double rms, const char* status = "ok") {

@@ -37,6 +37,32 @@ SoftBodySettings sheet(int n, double damping = 0) {
   return s;
 }
 
+// A chain of 20 points that falls from its held end; the springs very stiff or their dampers very strong.
+SoftBodySettings stiff_chain(double stiffness, double damping) {
+  SoftBodySettings s;
+  s.positions.setZero(20, 3);
+  SpringNetwork net;
+  for (int i = 0; i < 20; ++i) {
+    s.positions(i, 0) = i / 19.0;
+    if (i == 0) continue;
+    Spring spring;
+    spring.a = i - 1, spring.b = i, spring.stiffness = stiffness, spring.damping = damping;
+    net.springs.push_back(spring);
+  }
+  s.masses = Values<double>::Constant(20, 0.05);
+  s.network = std::make_shared<SpringNetwork>(net);
+  s.pins = {0};
+  return s;
+}
+
+// Of 60 ticks a second, a quarter of one.
+RunSetting coarse_ticks() {
+  RunSetting run;
+  run.duration = 0.25;
+  run.tick_rate = 60;
+  return run;
+}
+
 RunSetting half_a_second() {
   RunSetting run;
   run.duration = 0.5;
@@ -104,6 +130,42 @@ TEST(Chooser, GivesDampersToMethodsThatTakeThem) {
     const Verification truth = verify(chosen, half_a_second());
     EXPECT_LE(truth.error, choice.wanted_error) << choice.text();
   }
+}
+
+TEST(Chooser, TakesXpbdWhereSpringsAreVeryStiff) {
+  const SoftBodySettings body = stiff_chain(1e8, 0);
+  const SolverChoice choice = choose_solver(body, coarse_ticks(), 1e-2);
+  EXPECT_EQ(choice.method, &xpbd()) << choice.text();
+  EXPECT_NEAR(choice.dt * double(choice.substeps), 1.0 / 60, 1e-15);
+  const Candidate* verlet = nullptr;
+  for (const Candidate& c : choice.rejected)
+    if (c.method == &velocity_verlet()) verlet = &c;
+  EXPECT_TRUE(!verlet || verlet->seconds > 2 * choice.seconds) << choice.text();
+  SoftBodySettings chosen = body;
+  choice.apply(chosen);
+  World world(60);
+  const Body& moved = world.add(make_soft_body(chosen));
+  ASSERT_TRUE(world.update(0.25).good());
+  EXPECT_EQ(double(moved.motion_facts().evaluations), choice.evaluations) << "sweeps";
+  const Verification truth = verify(chosen, coarse_ticks());
+  EXPECT_TRUE(truth.converged());
+  EXPECT_LE(truth.error, choice.wanted_error) << choice.text();
+  // Softer springs or smaller errors are not for it.
+  EXPECT_EQ(choose_solver(stiff_chain(1e4, 0), coarse_ticks(), 1e-2).method, &velocity_verlet());
+  EXPECT_NE(choose_solver(body, coarse_ticks(), 1e-6).method, &xpbd());
+}
+
+TEST(Chooser, TakesBackwardEulerWhereDampersAreVeryStrong) {
+  const SoftBodySettings body = stiff_chain(1e5, 1e4);
+  const SolverChoice choice = choose_solver(body, coarse_ticks(), 1e-2);
+  EXPECT_EQ(choice.method, &implicit_euler()) << choice.text();
+  SoftBodySettings chosen = body;
+  choice.apply(chosen);
+  const Verification truth = verify(chosen, coarse_ticks());
+  EXPECT_TRUE(truth.converged());
+  EXPECT_LE(truth.error, choice.wanted_error) << choice.text();
+  const SolverChoice again = choose_solver(body, coarse_ticks(), 1e-2);
+  EXPECT_EQ(again.text(), choice.text());
 }
 
 TEST(Chooser, SaysSoWhereNothingMeetsIt) {

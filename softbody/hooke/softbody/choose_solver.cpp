@@ -1,5 +1,6 @@
 #include <hooke/softbody/choose_solver.hpp>
 
+#include <hooke/block_cholesky.hpp>
 #include <hooke/error.hpp>
 #include <hooke/softbody/filtered_grid.hpp>
 #include <hooke/world.hpp>
@@ -8,6 +9,7 @@
 #include <cmath>
 #include <cstdio>
 #include <limits>
+#include <optional>
 #include <stdexcept>
 
 namespace hooke::softbody {
@@ -29,6 +31,15 @@ constexpr double kLeastGrowth = 0.5, kMostGrowth = 2.5;
 constexpr double kDoubt = 0.75;
 // Filtered leapfrog is for errors from this share of the size on; its trials may cost so much of velocity Verlet's run.
 constexpr double kFilteredFrom = 3e-4, kFilteredBudget = 0.35, kQuietBudget = 0.08;
+// Methods that are stable at any step are for errors from this share of the size on, and for at most this share of
+// velocity Verlet's cost.
+constexpr double kCoarseFrom = 1e-4, kCoarseBudget = 0.5;
+// Dampers limit velocity Verlet's step where semi-implicit Euler's is longer by this: from 1 to 2.
+constexpr double kMostlyDamped = 1.3;
+// One step a tick of theirs so many times cheaper than velocity Verlet is tried before anything else.
+constexpr double kCoarseEarly = 16;
+// A step of backward Euler costs as much as so many evaluations of the forces at the least.
+constexpr double kLeastEvaluations = 10;
 // Of the rejected ones so many are told in words, those first that cost the least more.
 constexpr std::size_t kRejectedTold = 3;
 // Trials keep at most so many states.
@@ -68,6 +79,8 @@ bool springs_alone(const SoftBodySettings& s) {
                                     [](const Spring& spring) { return spring.damping > 0; });
 }
 
+bool is_implicit(const Method& method) { return &method != &xpbd() && std::holds_alternative<Implicit>(method.scheme); }
+
 void check(const SoftBodySettings& settings, const RunSetting& run) {
   const auto positive = [&](double value, const char* what) {
     if (!(value > 0) || !std::isfinite(value))
@@ -105,6 +118,7 @@ class Trial {
   Index done() const { return done_; }
   const std::vector<Points<double>>& states() const { return states_; }
   Points<double> positions() const { return body_->positions(); }
+  MotionFacts facts() const { return body_->motion_facts(); }
 
  private:
   World world_;
@@ -327,11 +341,18 @@ class Chooser {
     for (int i : {0, 1}) pair_[i] = trial(pair_candidate_[i]);
     const auto enough = [&](double error, const char* how) {
       try_semi_implicit_euler(precision);
+      try_coarse_steps();
       consider(base, std::max(error, floor_of(base)));
       choice_.reason =
           format("seen over the first %.3g of the run, velocity Verlet at its stability limit errs by %s %.1e m",
                  shown(share_), how, error);
     };
+    // Where coarse steps cost a small share of it, they are tried early: the pair would cost more than they do.
+    if (kCoarseEarly * with_steps(xpbd(), Precision::Float, 1).seconds < base.seconds &&
+        wanted_ >= kCoarseFrom * choice_.size) {
+      extend_pair(1.0 / 32);
+      if (try_coarse_steps()) return;
+    }
     for (const double share : {1.0 / 16, 1.0 / 8, 1.0 / 4}) {
       extend_pair(share);
       const Forecast now = forecast();
@@ -353,6 +374,97 @@ class Chooser {
     const auto seen = [&](double share) { return difference(*euler, *pair_[1], tick_of(share), stride_); };
     const Forecast error(seen(share_), seen(share_ / 2), shown(share_), highest_ ? kLeastGrowth : 0.0);
     if (kSafety * error.high <= wanted_) consider(c, std::max(error.likely, floor_of(c)));
+  }
+
+  // Methods that are stable at any step. True where one of them does.
+  bool try_coarse_steps() {
+    const std::size_t before = considered_.size();
+    if (!tried_coarse_)
+      for (const Method* method : {&xpbd(), &implicit_euler()}) try_coarse_steps(*method);
+    tried_coarse_ = true;
+    return considered_.size() > before;
+  }
+
+  // From one step a tick on. Velocity Verlet's finer trial judges it over the share that it has run; how errors grow
+  // from there to the end is seen on the method's own coarser steps, which must also come closer to each other.
+  void try_coarse_steps(const Method& method) {
+    if (wanted_ < kCoarseFrom * choice_.size) return;
+    // Where dampers alone limit the step, a few sweeps are as wrong at all coarse steps: their errors do not show.
+    if (&method == &xpbd() && limit(semi_implicit_euler()) > kMostlyDamped * limit(velocity_verlet())) return;
+    struct Level {
+      Candidate candidate;
+      std::unique_ptr<Trial> trial;
+      double seen = 0;
+    };
+    std::vector<Level> levels;
+    const Index first = tick_of(share_), last = tick_of(1);
+    double most = kCoarseBudget * pair_candidate_[0].seconds;
+    for (const Candidate& c : considered_)
+      if (c.predicted_error <= wanted_) most = std::min(most, c.seconds);
+    try {
+      double growth = std::pow(1 / shown(share_), kLeastGrowth), apart = 0;  // at the least, before it is seen
+      for (Index steps = 1;; steps *= 2) {
+        Level level;
+        level.candidate = with_steps(method, Precision::Float, steps);
+        if (is_implicit(method)) level.candidate.seconds *= kLeastEvaluations;
+        if (level.candidate.seconds > most) return;
+        level.trial = trial(level.candidate);
+        // First a little: an implicit method's cost is known once it has run.
+        if (!reach_coarse(level, stride_, most) || !reach_coarse(level, first, most)) return;
+        level.seen = difference(*level.trial, *pair_[1], first, stride_);
+        levels.push_back(std::move(level));
+        const std::size_t n = levels.size();
+        // Errors fall at order 1 to 2. Too far off?
+        const double order = n > 1 ? std::clamp(std::log2(levels[n - 2].seen / levels[n - 1].seen), 1.0, 2.0) : 2;
+        const auto hopeless = [&] {
+          const double finer = std::pow(kSafety * levels.back().seen * growth / wanted_, 1 / order);
+          return finer * levels.back().candidate.seconds > 1.5 * most;
+        };
+        if (hopeless()) return;
+        if (n < 2 || !(kSafety * levels[n - 1].seen * growth <= wanted_)) continue;
+        Level &a = levels[n < 3 ? 0 : n - 3], &b = levels[n < 3 ? 1 : n - 2];
+        if (!reach_coarse(a, last, most) || !reach_coarse(b, last, most)) return;
+        const double here = difference(*a.trial, *b.trial, first, stride_);
+        apart = difference(*a.trial, *b.trial, last, stride_);
+        growth = here > 0 && std::isfinite(apart) ? std::max(1.0, apart / here) : kInfinity;
+        if (hopeless()) return;
+        for (const Level& l : levels) {
+          // At order 1 two runs are as far apart as the finer one errs.
+          const double alone = apart * double(b.candidate.substeps) / double(l.candidate.substeps);
+          const double error = std::max(l.seen * growth, alone);
+          if (!(kSafety * error <= wanted_)) continue;
+          consider(l.candidate, std::max(error, floor_of(l.candidate)));
+          choice_.reason =
+              format("judged by velocity Verlet over the first %.3g of the run, its error grows %.2g-fold to the end",
+                     shown(share_), growth);
+          return;
+        }
+      }
+    } catch (const std::exception&) {
+      // It does not take this body.
+    }
+  }
+
+  // Runs it on, counts its work, and tells whether it got there within `most` seconds for the whole run.
+  template <class Level>
+  bool reach_coarse(Level& level, Index tick, double most) {
+    Trial& t = *level.trial;
+    const double before = double(t.done());
+    if (before >= double(tick)) return true;
+    t.reach(tick);
+    Candidate& c = level.candidate;
+    const double done = double(t.done()) / double(ticks_);
+    if (is_implicit(*c.method) && t.done() > 0) {
+      const MotionFacts facts = t.facts();
+      c.evaluations = double(facts.evaluations) / done;
+      if (!implicit_cost_) implicit_cost_.emplace(settings_);
+      c.seconds = implicit_cost_->seconds(c.precision, c.evaluations, double(facts.products) / done,
+                                          double(ticks_) * double(c.substeps));
+    }
+    const double share = done - before / double(ticks_);
+    choice_.pilot_evaluations += share * c.evaluations;
+    choice_.pilot_seconds += share * c.seconds;
+    return t.done() == tick && c.seconds <= most;
   }
 
   // Velocity Verlet at its limit is not enough.
@@ -463,10 +575,12 @@ class Chooser {
   Index ticks_, stride_ = 1;
   double tick_ = 0, wanted_ = 0;
   std::vector<Limit> limits_;
+  std::optional<ImplicitCost> implicit_cost_;
   const Method *high_ = nullptr, *highest_ = nullptr;  // of order 4 and, where there is one, 6
   Candidate base_, pair_candidate_[2];
   std::unique_ptr<Trial> pair_[2];
   double share_ = 0;
+  bool tried_coarse_ = false;
   std::vector<Candidate> considered_;
   SolverChoice choice_;
 };
@@ -475,16 +589,40 @@ class Chooser {
 
 double modelled_seconds(const SoftBodySettings& settings, const Method& method, Precision precision,
                         double evaluations) {
-  const CostTable& table = &method == &filtered_leapfrog() ? kFilteredCost
-                           : !springs_alone(settings)      ? kDampedCost
-                           : is_grid(settings)             ? kGridCost
-                                                           : kNetworkCost;
+  const CostTable& table = &method == &filtered_leapfrog()                   ? kFilteredCost
+                           : &method == &xpbd()                              ? kXpbdCost
+                           : !springs_alone(settings) || is_implicit(method) ? kDampedCost
+                           : is_grid(settings)                               ? kGridCost
+                                                                             : kNetworkCost;
   const double springs = settings.network ? double(settings.network->springs.size()) : 0;
   return 1e-9 * (precision == Precision::Float ? table.single : table.twice) *
          (springs + double(settings.positions.rows())) * evaluations;
 }
 
+ImplicitCost::ImplicitCost(const SoftBodySettings& settings) {
+  const Index points = settings.positions.rows();
+  std::vector<Coupling> couplings;
+  if (settings.network)
+    for (const Spring& spring : settings.network->springs) couplings.push_back({spring.a, spring.b, Mat3::Zero()});
+  springs_and_points_ = double(points) + double(couplings.size());
+  BlockCholesky factors;
+  factors.analyse(points, couplings);
+  if (!std::isfinite(factors.cost())) return;
+  factoring_ = factors.cost();
+  // 18 a block of the factors, of which there are about so many.
+  solving_ = 18 * std::sqrt(2 * factors.cost() * double(points) / 27);
+}
+
+double ImplicitCost::seconds(Precision precision, double evaluations, double products, double steps) const {
+  const bool single = precision == Precision::Float;
+  const double evaluation = springs_and_points_ * (single ? kDampedCost.single : kDampedCost.twice),
+               product = springs_and_points_ * (single ? kProductCost.single : kProductCost.twice);
+  const double refactoring = factoring_ > 0 ? product : 0;
+  return 1e-9 * (evaluation * evaluations + (product + solving_ + refactoring) * products + factoring_ * steps);
+}
+
 double evaluations_of(const Method& method, double ticks, double substeps) {
+  if (&method == &xpbd()) return ticks * substeps * kXpbdIterations;
   // What ends with a kick evaluates once more at a tick's end.
   const auto* table = std::get_if<Splitting>(&method.scheme);
   const bool kick_last = table && &method != &filtered_leapfrog() && table->drift.back() == 0;

@@ -29,13 +29,28 @@ inline constexpr CostTable kGridCost{0.75, 1.7};     ///< undamped springs of a 
 inline constexpr CostTable kNetworkCost{2.4, 3.9};   ///< other undamped springs
 inline constexpr CostTable kDampedCost{8, 10};       ///< springs beside other forces or with dampers
 inline constexpr CostTable kFilteredCost{1.6, 3.2};  ///< a step of filtered leapfrog
+inline constexpr CostTable kXpbdCost{15, 17};        ///< a sweep of xpbd(), a quarter of its substep's rest included
+inline constexpr CostTable kProductCost{20, 22};     ///< a product of an implicit solve
 
-/// What the table says of `evaluations` of the forces on this body.
+/// What the table says of `evaluations` of the forces on this body, or sweeps of xpbd().
 /// @return [s]
 double modelled_seconds(const SoftBodySettings& settings, const Method& method, Precision precision,
                         double evaluations);
 
-/// Force evaluations of a run of `ticks` ticks of `substeps` steps, explicit methods.
+/// What implicit methods cost on a body by the table and counted work, as if every step and every run of products
+/// that is worth it began with a factorisation of the springs' matrix: 1 ns a multiplication in it and in its solves.
+class ImplicitCost {
+ public:
+  /// Cost: that of ordering the matrix.
+  explicit ImplicitCost(const SoftBodySettings& settings);
+  /// @return [s]
+  double seconds(Precision precision, double evaluations, double products, double steps) const;
+
+ private:
+  double springs_and_points_, factoring_ = 0, solving_ = 0;  // multiplications
+};
+
+/// Force evaluations of a run of `ticks` ticks of `substeps` steps, explicit methods; sweeps of xpbd().
 double evaluations_of(const Method& method, double ticks, double substeps);
 
 /// A way to move the body that was looked at.
@@ -44,7 +59,7 @@ struct Candidate {
   Precision precision = Precision::Double;
   Index substeps = 1;          ///< a tick
   double predicted_error = 0;  ///< RMS over the points at the end of the run [m]
-  double evaluations = 0;      ///< of all forces in the run
+  double evaluations = 0;      ///< of all forces in the run; sweeps of xpbd()
   double seconds = 0;          ///< by the table
 };
 
@@ -69,7 +84,8 @@ struct SolverChoice : Candidate {
 ///
 /// Short trial runs at and below the stability limit of velocity Verlet are compared and their difference is
 /// extrapolated to the end of the run; for grids and coarse errors filtered leapfrog is refined from coarse steps.
-/// Methods of order 4 and 6 are tried where velocity Verlet would need much shorter steps. Everything is decided by
+/// Methods of order 4 and 6 are tried where velocity Verlet would need much shorter steps, xpbd() and backward Euler
+/// where its stable step is so short that coarse steps of theirs cost much less. Everything is decided by
 /// counted operations and CostTable: the same arguments give the same choice on every machine whose arithmetic is
 /// IEEE's. Cost: about 0.1 to 0.8 of the run that it picks; told in the choice.
 /// @param settings `motion.method`, `motion.dt`, `precision` and `wanted_error` are not looked at

@@ -14,7 +14,6 @@ namespace hooke::softbody {
 namespace {
 
 constexpr double kDefaultStep = 1.0 / 1200;  // [s]
-constexpr int kDefaultIterations = 4;
 
 // What a spring carries to the next substep follows its force within this time [s], where that is safe.
 constexpr double kFollow = 0.3;
@@ -521,7 +520,7 @@ std::unique_ptr<PointBody<S>> make_xpbd_body(std::string name, PointMasses<S> po
   MotionSettings complete = settings;
   const bool automatic = settings.dt == 0;
   if (automatic) complete.dt = kDefaultStep;
-  if (complete.iterations == 0) complete.iterations = kDefaultIterations;
+  if (complete.iterations == 0) complete.iterations = kXpbdIterations;
   return std::make_unique<XpbdBody<S>>(std::move(name), std::move(points), complete, automatic, std::move(network));
 }
 

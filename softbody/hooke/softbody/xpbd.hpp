@@ -10,6 +10,8 @@
 
 namespace hooke::softbody {
 
+inline constexpr int kXpbdIterations = 4;  ///< sweeps a substep where none are asked for
+
 /// Extended position-based dynamics with small steps: backward Euler whose spring forces are found by a
 /// few Gauss-Seidel sweeps a substep (MotionSettings::iterations). Order 1, bounded at any step, stiffness and mass
 /// ratio; loses energy. What the sweeps leave of a spring's force is made up over the following substeps, so that
