@@ -25,6 +25,8 @@ constexpr double kSafety = 2, kHighSafety = 3;
 constexpr double kFloatFloor = 1.2e-8;
 // What rounding alone may take must be so much less than the wanted error.
 constexpr double kRoom = 1.3;
+// What moves less than this many roundings of its size a step is moved the general way in float, as PointBody does.
+constexpr double kSlow = 256;
 // Errors grow as a power of time between these; measured ones beyond are not believed.
 constexpr double kLeastGrowth = 0.5, kMostGrowth = 2.5;
 // The power may be wrong by this.
@@ -34,6 +36,11 @@ constexpr double kFilteredFrom = 3e-4, kFilteredBudget = 0.35, kQuietBudget = 0.
 // Methods that are stable at any step are for errors from this share of the size on, and for at most this share of
 // velocity Verlet's cost.
 constexpr double kCoarseFrom = 1e-4, kCoarseBudget = 0.5;
+// They are judged up to this share of the run, and this many kept states at the least.
+constexpr double kCoarseShare = 1.0 / 8;
+constexpr Index kCoarseTicks = 4;
+// What their damping takes from a motion adds up at least as a fall does.
+constexpr double kCoarseGrowth = 2;
 // Dampers limit velocity Verlet's step where semi-implicit Euler's is longer by this: from 1 to 2.
 constexpr double kMostlyDamped = 1.3;
 // One step a tick of theirs so many times cheaper than velocity Verlet is tried before anything else.
@@ -112,12 +119,16 @@ class Trial {
     const double length = world_.clock().tick();
     while (good_ && done_ < tick) {
       good_ = world_.update(length).good();
-      if (good_ && ++done_ % stride_ == 0) states_.push_back(body_->positions());
+      if (good_ && ++done_ % stride_ == 0) {
+        states_.push_back(body_->positions());
+        speeds_.push_back(std::sqrt(body_->velocities().square().rowwise().sum().mean()));
+      }
     }
   }
   Index done() const { return done_; }
   const std::vector<Points<double>>& states() const { return states_; }
   Points<double> positions() const { return body_->positions(); }
+  const std::vector<double>& speeds() const { return speeds_; }  // RMS over points, beside the states [m/s]
   MotionFacts facts() const { return body_->motion_facts(); }
 
  private:
@@ -126,6 +137,7 @@ class Trial {
   Index stride_, done_ = 0;
   bool good_ = true;
   std::vector<Points<double>> states_;
+  std::vector<double> speeds_;
 };
 
 // The most that two runs differ up to a tick; infinite where one of them failed.
@@ -169,6 +181,10 @@ class Chooser {
     if (run.prepare) run.prepare(*body);
     for (const Method* method : {&velocity_verlet(), &semi_implicit_euler(), &pefrl(), &blanes_moan_6(), &rk4()})
       limits_.push_back({method, body->stable_step(*method)});
+    // What the first part of a fall and the energy in its springs make of it.
+    const double start = settings.velocities.rows() ? settings.velocities.square().sum() / double(body->size()) : 0;
+    const double fall = run.gravity.norm() * run.duration / 8, mass = settings.masses.sum();
+    speed_ = std::sqrt(start + fall * fall + (mass > 0 ? body->energy(run.gravity).elastic / mass : 0));
     high_ = body->motion_facts().velocity_forces ? &rk4() : &pefrl();
     highest_ = high_ == &pefrl() ? &blanes_moan_6() : nullptr;
   }
@@ -177,6 +193,9 @@ class Chooser {
     if (settings_.positions.rows() == 0 || !(choice_.size > 0)) return trivial("a body without size needs no choice");
     if (!std::isfinite(limit(velocity_verlet()))) return trivial("nothing limits the step");
     base_ = candidate(velocity_verlet(), Precision::Float, 1);
+    const double twice = candidate(velocity_verlet(), Precision::Double, 1).seconds;
+    slow_in_float_ = twice < base_.seconds;
+    base_.seconds = std::min(base_.seconds, twice);
     if (!filtered_leapfrog_does()) look_at_velocity_verlet();
     return finish();
   }
@@ -209,7 +228,8 @@ class Chooser {
     out.precision = precision;
     out.substeps = steps;
     out.evaluations = evaluations_of(method, double(ticks_), double(steps));
-    out.seconds = modelled_seconds(settings_, method, precision, out.evaluations);
+    const bool slow = speed_ < slow_speed(settings_, tick_ / double(steps));
+    out.seconds = modelled_seconds(settings_, method, precision, out.evaluations, slow);
     return out;
   }
 
@@ -313,7 +333,15 @@ class Chooser {
   // The pair of trials of velocity Verlet, at the limit and at half of it, on to a share of the run.
   void extend_pair(double share) {
     share_ = share;
-    for (int i : {0, 1}) reach(*pair_[i], pair_candidate_[i], tick_of(share));
+    for (int i : {0, 1})
+      if (pair_[i]->done() < tick_of(share)) reach(*pair_[i], pair_candidate_[i], tick_of(share));
+    // Speeds grow at most as in a fall.
+    const std::vector<double>& speeds = pair_[1]->speeds();
+    const std::size_t n = std::size_t(tick_of(share) / stride_);
+    if (speeds.size() < n) return;
+    const double now = speeds[n - 1], half = speeds[(n + 1) / 2 - 1];
+    const double power = n > 1 && half > 0 ? std::clamp(std::log2(now / half), 0.0, 1.0) : 0.5;
+    speed_ = now * std::pow(std::max(1.0, 0.6 / shown(share)), power);
   }
 
   // Error at the limit as the pair tells it: 4/3 of the difference at order 2, twice where motion is rough. Where it
@@ -335,14 +363,20 @@ class Chooser {
   void look_at_velocity_verlet() {
     const Method& method = velocity_verlet();
     // Where rounding rules float out.
-    const Precision precision = wanted_ >= kRoom * floor_of(base_) ? Precision::Float : Precision::Double;
+    const Precision precision =
+        wanted_ >= kRoom * floor_of(base_) && !slow_in_float_ ? Precision::Float : Precision::Double;
     const Candidate base = candidate(method, precision, 1);
     pair_candidate_[0] = base, pair_candidate_[1] = candidate(method, precision, 2);
     for (int i : {0, 1}) pair_[i] = trial(pair_candidate_[i]);
     const auto enough = [&](double error, const char* how) {
       try_semi_implicit_euler(precision);
-      try_coarse_steps();
-      consider(base, std::max(error, floor_of(base)));
+      const bool coarse = try_coarse_steps();
+      for (const Precision p : {Precision::Float, Precision::Double}) {
+        const Candidate c = candidate(method, p, 1);
+        const double rounding = floor_of(c);
+        consider(c, std::max(error, p == precision ? rounding : kRoom * rounding));
+      }
+      if (coarse) return;
       choice_.reason =
           format("seen over the first %.3g of the run, velocity Verlet at its stability limit errs by %s %.1e m",
                  shown(share_), how, error);
@@ -385,60 +419,47 @@ class Chooser {
     return considered_.size() > before;
   }
 
-  // From one step a tick on. Velocity Verlet's finer trial judges it over the share that it has run; how errors grow
-  // from there to the end is seen on the method's own coarser steps, which must also come closer to each other.
+  // From one step a tick on, until the error that velocity Verlet's trial sees at the end of its share gives hope. Then
+  // both go on to where damping of what should swing shows.
   void try_coarse_steps(const Method& method) {
     if (wanted_ < kCoarseFrom * choice_.size) return;
     // Where dampers alone limit the step, a few sweeps are as wrong at all coarse steps: their errors do not show.
     if (&method == &xpbd() && limit(semi_implicit_euler()) > kMostlyDamped * limit(velocity_verlet())) return;
-    struct Level {
-      Candidate candidate;
-      std::unique_ptr<Trial> trial;
-      double seen = 0;
-    };
-    std::vector<Level> levels;
-    const Index first = tick_of(share_), last = tick_of(1);
+    const Index first = tick_of(share_),
+                judged = std::max(first, std::min(tick_of(1), std::max(tick_of(kCoarseShare), kCoarseTicks * stride_)));
+    const double share = double(judged) / double(ticks_);
     double most = kCoarseBudget * pair_candidate_[0].seconds;
     for (const Candidate& c : considered_)
       if (c.predicted_error <= wanted_) most = std::min(most, c.seconds);
     try {
-      double growth = std::pow(1 / shown(share_), kLeastGrowth), apart = 0;  // at the least, before it is seen
+      double before = kInfinity;
       for (Index steps = 1;; steps *= 2) {
-        Level level;
-        level.candidate = with_steps(method, Precision::Float, steps);
-        if (is_implicit(method)) level.candidate.seconds *= kLeastEvaluations;
-        if (level.candidate.seconds > most) return;
-        level.trial = trial(level.candidate);
+        Candidate c = with_steps(method, Precision::Float, steps);
+        if (is_implicit(method)) c.seconds *= kLeastEvaluations;
+        if (c.seconds > most) return;
+        const auto now = trial(c);
         // First a little: an implicit method's cost is known once it has run.
-        if (!reach_coarse(level, stride_, most) || !reach_coarse(level, first, most)) return;
-        level.seen = difference(*level.trial, *pair_[1], first, stride_);
-        levels.push_back(std::move(level));
-        const std::size_t n = levels.size();
-        // Errors fall at order 1 to 2. Too far off?
-        const double order = n > 1 ? std::clamp(std::log2(levels[n - 2].seen / levels[n - 1].seen), 1.0, 2.0) : 2;
-        const auto hopeless = [&] {
-          const double finer = std::pow(kSafety * levels.back().seen * growth / wanted_, 1 / order);
-          return finer * levels.back().candidate.seconds > 1.5 * most;
-        };
-        if (hopeless()) return;
-        if (n < 2 || !(kSafety * levels[n - 1].seen * growth <= wanted_)) continue;
-        Level &a = levels[n < 3 ? 0 : n - 3], &b = levels[n < 3 ? 1 : n - 2];
-        if (!reach_coarse(a, last, most) || !reach_coarse(b, last, most)) return;
-        const double here = difference(*a.trial, *b.trial, first, stride_);
-        apart = difference(*a.trial, *b.trial, last, stride_);
-        growth = here > 0 && std::isfinite(apart) ? std::max(1.0, apart / here) : kInfinity;
-        if (hopeless()) return;
-        for (const Level& l : levels) {
-          // At order 1 two runs are as far apart as the finer one errs.
-          const double alone = apart * double(b.candidate.substeps) / double(l.candidate.substeps);
-          const double error = std::max(l.seen * growth, alone);
-          if (!(kSafety * error <= wanted_)) continue;
-          consider(l.candidate, std::max(error, floor_of(l.candidate)));
-          choice_.reason =
-              format("judged by velocity Verlet over the first %.3g of the run, its error grows %.2g-fold to the end",
-                     shown(share_), growth);
-          return;
+        if (!reach_coarse(*now, c, stride_, most) || !reach_coarse(*now, c, first, most)) return;
+        double seen = difference(*now, *pair_[0], first, stride_);
+        double grown = 1 / shown(share_);
+        if (kHighSafety * seen * grown <= wanted_) {
+          if (pair_[0]->done() < judged) reach(*pair_[0], pair_candidate_[0], judged);
+          if (!reach_coarse(*now, c, judged, most)) return;
+          seen = difference(*now, *pair_[0], judged, stride_);
+          const double half = difference(*now, *pair_[0], std::max(stride_, judged / 2), stride_);
+          const double error = Forecast(seen, half, share, kCoarseGrowth).likely;
+          if (kHighSafety * error <= wanted_) {
+            consider(c, std::max(error, floor_of(c)));
+            choice_.reason =
+                format("velocity Verlet, run over the first %.3g, sees it err by %.1e m there", share, seen);
+            return;
+          }
+          grown = error / seen;
         }
+        // Errors fall at order 1 to 2. Too far off?
+        const double order = std::clamp(std::log2(before / seen), 1.0, 2.0);
+        if (std::pow(kHighSafety * seen * grown / wanted_, 1 / order) * c.seconds > 1.5 * most) return;
+        before = seen;
       }
     } catch (const std::exception&) {
       // It does not take this body.
@@ -446,13 +467,10 @@ class Chooser {
   }
 
   // Runs it on, counts its work, and tells whether it got there within `most` seconds for the whole run.
-  template <class Level>
-  bool reach_coarse(Level& level, Index tick, double most) {
-    Trial& t = *level.trial;
+  bool reach_coarse(Trial& t, Candidate& c, Index tick, double most) {
     const double before = double(t.done());
     if (before >= double(tick)) return true;
     t.reach(tick);
-    Candidate& c = level.candidate;
     const double done = double(t.done()) / double(ticks_);
     if (is_implicit(*c.method) && t.done() > 0) {
       const MotionFacts facts = t.facts();
@@ -573,6 +591,7 @@ class Chooser {
   SoftBodySettings settings_;
   const RunSetting& run_;
   Index ticks_, stride_ = 1;
+  double speed_ = 0;  // RMS over points and time [m/s], as far as it is known
   double tick_ = 0, wanted_ = 0;
   std::vector<Limit> limits_;
   std::optional<ImplicitCost> implicit_cost_;
@@ -580,20 +599,27 @@ class Chooser {
   Candidate base_, pair_candidate_[2];
   std::unique_ptr<Trial> pair_[2];
   double share_ = 0;
-  bool tried_coarse_ = false;
+  bool slow_in_float_ = false, tried_coarse_ = false;
   std::vector<Candidate> considered_;
   SolverChoice choice_;
 };
 
 }  // namespace
 
-double modelled_seconds(const SoftBodySettings& settings, const Method& method, Precision precision,
-                        double evaluations) {
-  const CostTable& table = &method == &filtered_leapfrog()                   ? kFilteredCost
-                           : &method == &xpbd()                              ? kXpbdCost
-                           : !springs_alone(settings) || is_implicit(method) ? kDampedCost
-                           : is_grid(settings)                               ? kGridCost
-                                                                             : kNetworkCost;
+double slow_speed(const SoftBodySettings& settings, double h) {
+  const double least = kSlow * double(std::numeric_limits<float>::epsilon()) / h;
+  return settings.positions.rows() ? least * settings.positions.abs().maxCoeff() : 0;
+}
+
+double modelled_seconds(const SoftBodySettings& settings, const Method& method, Precision precision, double evaluations,
+                        bool slow) {
+  const bool fused = springs_alone(settings) && std::holds_alternative<Splitting>(method.scheme) &&
+                     !(slow && precision == Precision::Float);
+  const CostTable& table = &method == &filtered_leapfrog() ? kFilteredCost
+                           : &method == &xpbd()            ? kXpbdCost
+                           : !fused                        ? kDampedCost
+                           : is_grid(settings)             ? kGridCost
+                                                           : kNetworkCost;
   const double springs = settings.network ? double(settings.network->springs.size()) : 0;
   return 1e-9 * (precision == Precision::Float ? table.single : table.twice) *
          (springs + double(settings.positions.rows())) * evaluations;

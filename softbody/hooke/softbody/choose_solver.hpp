@@ -25,17 +25,23 @@ struct RunSetting {
 struct CostTable {
   double single, twice;  ///< float, double
 };
-inline constexpr CostTable kGridCost{0.75, 1.7};     ///< undamped springs of a grid
-inline constexpr CostTable kNetworkCost{2.4, 3.9};   ///< other undamped springs
-inline constexpr CostTable kDampedCost{8, 10};       ///< springs beside other forces or with dampers
+inline constexpr CostTable kGridCost{0.75, 1.7};    ///< undamped springs of a grid
+inline constexpr CostTable kNetworkCost{2.4, 3.9};  ///< other undamped springs
+inline constexpr CostTable kDampedCost{8,
+                                       10};  ///< the general way: other forces, dampers, other methods, slow in float
 inline constexpr CostTable kFilteredCost{1.6, 3.2};  ///< a step of filtered leapfrog
 inline constexpr CostTable kXpbdCost{15, 17};        ///< a sweep of xpbd(), a quarter of its substep's rest included
 inline constexpr CostTable kProductCost{20, 22};     ///< a product of an implicit solve
 
+/// The speed [m/s], RMS over points, below which fused kernels leave a body in float to the general way at steps of h
+/// (MotionSettings::compensated).
+double slow_speed(const SoftBodySettings& settings, double h);
+
 /// What the table says of `evaluations` of the forces on this body, or sweeps of xpbd().
+/// @param slow it moves more slowly than slow_speed
 /// @return [s]
-double modelled_seconds(const SoftBodySettings& settings, const Method& method, Precision precision,
-                        double evaluations);
+double modelled_seconds(const SoftBodySettings& settings, const Method& method, Precision precision, double evaluations,
+                        bool slow = false);
 
 /// What implicit methods cost on a body by the table and counted work, as if every step and every run of products
 /// that is worth it began with a factorisation of the springs' matrix: 1 ns a multiplication in it and in its solves.
