@@ -419,20 +419,21 @@ void PointBody<S>::bound_swing(const Tick& tick) {
   if (swing_checked_ >= 0 && tick.start - swing_checked_ < interval * (1 - 1e-9)) return;
   swing_checked_ = tick.start;
   const double h = (tick.end - tick.start) / double(substeps_);
-  Points<S> a(size(), 3);
+  Points<S>& a = damping_product_;  // its memory
   acceleration(points_.position, points_.velocity, tick.start, a);
   const auto free = points_.inverse_mass > S(0);
   const bool falls_freely = free.all() && (tick.colliders.empty() || !settings_.collides);
-  if (falls_freely) a.rowwise() -= tick.gravity.transpose().array().template cast<S>();
-  double swing = double((points_.mass * free.select(a.square().rowwise().sum(), S(0))).sum());
+  for (int k = 0; k < 3 && falls_freely; ++k) a.col(k) -= S(tick.gravity[k]);
+  double swing = 0;
+  for (int k = 0; k < 3; ++k) swing += double((points_.mass * free.select(a.col(k).square(), S(0))).sum());
   force_.setZero(size(), 3);
   for (const auto& field : fields_) field->add_stiffness_times(points_.position, points_.velocity, true, force_);
-  swing += double((points_.velocity * force_).sum());
+  for (int k = 0; k < 3; ++k) swing += double((points_.velocity.col(k) * force_.col(k)).sum());
   swing *= h * h / 8;
   // What starts from rest has fallen for as long as this is not looked at.
   const double fall = tick.gravity.norm() * kSwingInterval;
   const Energy energy = this->energy(tick.gravity);
-  exchanged_ = std::max(exchanged_, energy.kinetic + energy.elastic + total_mass() * fall * fall / 2);
+  exchanged_ = std::max(exchanged_, energy.kinetic + energy.elastic + double(points_.mass.sum()) * fall * fall / 2);
   if (swing <= kSwing * exchanged_) return;
   step_share_ = std::min(step_share_, std::sqrt(kSwing / 2 * exchanged_ / swing) * h / automatic_step());
   last_estimate_ = -1;
@@ -715,7 +716,7 @@ double PointBody<S>::kept_energy() {
   const Method& method = *settings_.method;
   if (!method.symplectic || method.order > 2 || std::isinf(method.stability_limit)) return energy;
   const double h = (tick_.end - tick_.start) / double(std::max<Index>(substeps_, 1));
-  Points<S> a(size(), 3);
+  Points<S>& a = damping_product_;  // its memory
   acceleration(points_.position, points_.velocity, tick_.end, a);
   settle(a);
   if (method.order == 1)
