@@ -271,8 +271,10 @@ void PointBody<S>::acceleration(const Points<S>& x, const Points<S>& v, double t
     a.setZero(x.rows(), 3);
   } else {
     force_.setZero(x.rows(), 3);
-    // Only of the state itself is it known what rounding has dropped, and what moves fast does not need it.
-    const Points<S>* low = slow_ && &x == &points_.position ? integrator_.position_low() : nullptr;
+    // Only of the state itself is it known what rounding has dropped. Dampers take from what moves fast what that
+    // would give it.
+    const bool shows = slow_ || !uses_velocity_;
+    const Points<S>* low = shows && &x == &points_.position ? integrator_.position_low() : nullptr;
     for (const auto& field : fields_) {
       if (low)
         field->add_fine_force(x, *low, v, t, force_);
