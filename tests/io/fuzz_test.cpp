@@ -10,6 +10,11 @@
 
 #include <functional>
 
+#ifdef __SANITIZE_ADDRESS__
+// assimp leaks the joints of a BVH file that it gives up.
+extern "C" const char* __lsan_default_suppressions() { return "leak:libassimp\n"; }
+#endif
+
 namespace hooke::io {
 namespace {
 
