@@ -19,9 +19,6 @@ constexpr double kEstimateInterval = 1.0 / 30;
 constexpr double kOrdinary = 1e9;
 // A given substep is held against the stable one this often [s].
 constexpr double kStepCheckInterval = 0.25;
-// In float, bodies that move less than so many roundings of their size a substep are moved where sums are
-// compensated.
-constexpr double kSlow = 256;
 // The automatic step of undamped bodies keeps the swing of their energy below this share of what their motion
 // exchanges. It is looked at this often to begin with, and later whenever twice the time has passed, at least this
 // often [s].
@@ -455,8 +452,7 @@ SolveResult PointBody<S>::substep(double t, double h) {
 template <class S>
 bool PointBody<S>::run_fast() {
   const auto* table = std::get_if<Splitting>(&settings_.method->scheme);
-  if (!fused() || watching_ || prescribes() || collides()) return false;
-  if (slow_) return false;
+  if (!fused() || slow_ || watching_ || prescribes() || collides()) return false;
   const double h = (tick_.end - tick_.start) / double(substeps_);
   stages_.clear();
   std::int64_t evaluations = 0;

@@ -57,6 +57,9 @@ class PointBody : public Body, protected Dynamics<S> {
   /// surfaces bear taken off, no more is left than this share of its weight or what the rounding of its positions
   /// makes of stiff springs in float.
   static constexpr double kQuietSpeed = 2e-4, kQuietTime = 0.5, kQuietForce = 0.01;
+  /// In float, bodies that move less than so many roundings of their size a substep, RMS over points, are moved where
+  /// sums are compensated: not by steppers.
+  static constexpr double kSlow = 256;
   /// Σ |f_i| over free points [N] of gravity, fields and contacts, were it at rest where it is. Cost: one evaluation.
   virtual double residual_force(const Vec3& gravity);
 

@@ -2,6 +2,7 @@
 
 #include <hooke/block_cholesky.hpp>
 #include <hooke/error.hpp>
+#include <hooke/point_body.hpp>
 #include <hooke/softbody/filtered_grid.hpp>
 #include <hooke/world.hpp>
 
@@ -25,8 +26,6 @@ constexpr double kSafety = 2, kHighSafety = 3;
 constexpr double kFloatFloor = 1.2e-8;
 // What rounding alone may take must be so much less than the wanted error.
 constexpr double kRoom = 1.3;
-// What moves less than this many roundings of its size a step is moved the general way in float, as PointBody does.
-constexpr double kSlow = 256;
 // Errors grow as a power of time between these; measured ones beyond are not believed.
 constexpr double kLeastGrowth = 0.5, kMostGrowth = 2.5;
 // The power may be wrong by this.
@@ -607,7 +606,7 @@ class Chooser {
 }  // namespace
 
 double slow_speed(const SoftBodySettings& settings, double h) {
-  const double least = kSlow * double(std::numeric_limits<float>::epsilon()) / h;
+  const double least = PointBody<float>::kSlow * double(std::numeric_limits<float>::epsilon()) / h;
   return settings.positions.rows() ? least * settings.positions.abs().maxCoeff() : 0;
 }
 

@@ -27,8 +27,8 @@ struct CostTable {
 };
 inline constexpr CostTable kGridCost{0.75, 1.7};    ///< undamped springs of a grid
 inline constexpr CostTable kNetworkCost{2.4, 3.9};  ///< other undamped springs
-inline constexpr CostTable kDampedCost{8,
-                                       10};  ///< the general way: other forces, dampers, other methods, slow in float
+/// The general way: other forces, dampers, other methods, slow in float.
+inline constexpr CostTable kDampedCost{8, 10};
 inline constexpr CostTable kFilteredCost{1.6, 3.2};  ///< a step of filtered leapfrog
 inline constexpr CostTable kXpbdCost{15, 17};        ///< a sweep of xpbd(), a quarter of its substep's rest included
 inline constexpr CostTable kProductCost{20, 22};     ///< a product of an implicit solve
