@@ -31,7 +31,7 @@ std::uint64_t checksum(std::string_view bytes);
 /// numbers little-endian; a bool is a byte.
 class CheckpointWriter {
  public:
-  static constexpr std::uint32_t kVersion = 2;
+  static constexpr std::uint32_t kVersion = 3;
 
   void begin(std::string_view section);
   void end();

@@ -4,7 +4,7 @@
 namespace hooke {
 
 /// Watches the energy of a body to which nothing gives any. The kinetic energy is looked at every tick; the
-/// total, which costs as much as an evaluation of the forces, only where that has grown by a fifth since the
+/// total, which costs as much as an evaluation of the forces, only where that has grown by a half since the
 /// last look: a few dozen times while a motion blows up, and hardly ever where it does not.
 class EnergyWatch {
  public:
@@ -22,7 +22,7 @@ class EnergyWatch {
     known_ = true, start_ = total, looked_at_ = kinetic, rounding_ = rounding;
   }
   /// True where `judge` must be asked.
-  bool due(double kinetic) const { return known_ && kinetic > 1.2 * looked_at_ && kinetic > rounding_; }
+  bool due(double kinetic) const { return known_ && kinetic > 1.5 * looked_at_ && kinetic > rounding_; }
   Finding judge(double total, double kinetic) {
     looked_at_ = kinetic;
     const double gain = total - start_ - rounding_;

@@ -63,6 +63,8 @@ class ForceField {
 
   /// A faster way to move points on which this field, gravity and pushes act alone, or null.
   virtual std::unique_ptr<Stepper<S>> stepper() const { return nullptr; }
+  /// One that steps in double and keeps what the rounding of S drops, or null. Of float alone.
+  virtual std::unique_ptr<Stepper<S>> fine_stepper() const { return nullptr; }
 
   /// Its settings, so that checkpoints know it again. Fields keep no state: what they are at t is a function of t.
   virtual void describe(Blueprint&) const {}

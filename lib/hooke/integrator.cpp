@@ -31,7 +31,7 @@ void Integrator<S>::save(CheckpointWriter& out) const {
   out.add(std::int64_t(adapted_steps_));
   out.add(work_.evaluations);
   out.add(work_.products);
-  for (const Points<S>* low : {&position_low_, &velocity_low_}) {
+  for (const Points<S>* low : {&low_.position, &low_.velocity}) {
     out.add(low->rows() > 0);
     if (low->rows() > 0) out.add(*low);
   }
@@ -45,7 +45,7 @@ void Integrator<S>::load(CheckpointReader& in, Index points) {
   adapted_steps_ = Index(in.number<std::int64_t>("adapted steps", 0));
   work_.evaluations = in.number<std::int64_t>("evaluations", 0);
   work_.products = in.number<std::int64_t>("products", 0);
-  for (Points<S>* low : {&position_low_, &velocity_low_}) {
+  for (Points<S>* low : {&low_.position, &low_.velocity}) {
     low->resize(0, 3);
     if (in.number<bool>("has low parts")) in.array("low parts", *low, points);
   }
@@ -80,27 +80,27 @@ void Integrator<S>::add(Points<S>& sum, Points<S>& low, double factor, const Poi
 
 template <class S>
 void Integrator<S>::drop_low(Index point) {
-  if (point < position_low_.rows()) position_low_.row(point).setZero();
-  if (point < velocity_low_.rows()) velocity_low_.row(point).setZero();
+  if (point < low_.position.rows()) low_.position.row(point).setZero();
+  if (point < low_.velocity.rows()) low_.velocity.row(point).setZero();
 }
 
 // Dynamics' own, and what sums kept for coordinates that it has set is dropped.
 template <class S>
 void Integrator<S>::collide(Dynamics<S>& dynamics, double t0, double t1, Points<S>& x, Points<S>& v) {
-  const bool keeps = compensated_ && position_low_.size() == x.size();
+  const bool keeps = compensated_ && low_.position.size() == x.size();
   if (keeps) touched_x_ = x, touched_v_ = v;
   dynamics.collide(t0, from_, t1, x, v);
   if (!keeps) return;
-  position_low_ = (x == touched_x_).select(position_low_, S(0));
-  if (velocity_low_.size() == v.size()) velocity_low_ = (v == touched_v_).select(velocity_low_, S(0));
+  low_.position = (x == touched_x_).select(low_.position, S(0));
+  if (low_.velocity.size() == v.size()) low_.velocity = (v == touched_v_).select(low_.velocity, S(0));
 }
 
 template <class S>
 void Integrator<S>::settle(Dynamics<S>& dynamics, Points<S>& v) {
-  const bool keeps = compensated_ && velocity_low_.size() == v.size();
+  const bool keeps = compensated_ && low_.velocity.size() == v.size();
   if (keeps) touched_v_ = v;
   dynamics.settle(v);
-  if (keeps) velocity_low_ = (v == touched_v_).select(velocity_low_, S(0));
+  if (keeps) low_.velocity = (v == touched_v_).select(low_.velocity, S(0));
 }
 
 template <class S>
@@ -109,7 +109,7 @@ void Integrator<S>::prescribe(Dynamics<S>& dynamics, double t0, const Points<S>&
   dynamics.prescribe(t0, from, t1, x, v);
   if (!compensated_) return;
   const Values<S>& free = dynamics.inverse_mass();
-  for (Points<S>* low : {&position_low_, &velocity_low_})
+  for (Points<S>* low : {&low_.position, &low_.velocity})
     for (int k = 0; k < 3 && low->rows() == free.size(); ++k) low->col(k) = (free == S(0)).select(S(0), low->col(k));
 }
 
@@ -145,12 +145,12 @@ SolveResult Integrator<S>::run(const Splitting& table, Dynamics<S>& dynamics, Po
         }
         acceleration_known_ = true;
       }
-      add(v, velocity_low_, kick, acceleration_);
+      add(v, low_.velocity, kick, acceleration_);
     }
     if (table.drift[i] != 0) {
       const double next = i == last_drift ? t + h : now + table.drift[i] * h;
       if (held) drift_from_ = x;
-      add(x, position_low_, table.drift[i] * h, v);
+      add(x, low_.position, table.drift[i] * h, v);
       if (held) prescribe(dynamics, now, drift_from_, next, x, v);
       now = next;
       acceleration_known_ = false;
@@ -168,18 +168,18 @@ SolveResult Integrator<S>::run(const Verlet&, Dynamics<S>& dynamics, Points<S>& 
   if (increment_step_ != h) {
     increment_ = step * v - (S(0.5) * step * step) * acceleration_;
     increment_step_ = h;
-    velocity_low_.setZero();
+    low_.velocity.setZero();
   }
   // Here the low part of velocity is that of the increment.
-  add(increment_, velocity_low_, h * h, acceleration_);
+  add(increment_, low_.velocity, h * h, acceleration_);
   if (dynamics.prescribes() || dynamics.collides()) {
     from_ = x;
-    add(x, position_low_, 1, increment_);
+    add(x, low_.position, 1, increment_);
     v = increment_ / step;
     finish(dynamics, t, t + h, x, v);
     increment_ = step * v;
   } else {
-    add(x, position_low_, 1, increment_);
+    add(x, low_.position, 1, increment_);
   }
   if (dynamics.uses_velocity()) {
     predicted_ = increment_ / step + (S(0.5) * step) * acceleration_;
@@ -238,8 +238,8 @@ SolveResult Integrator<S>::run(const RungeKutta& table, Dynamics<S>& dynamics, P
   } else {
     for (std::size_t i = 0; i < table.weight.size(); ++i) {
       if (table.weight[i] == 0) continue;
-      add(x, position_low_, table.weight[i] * h, stage_velocity_[i]);
-      add(v, velocity_low_, table.weight[i] * h, stage_acceleration_[i]);
+      add(x, low_.position, table.weight[i] * h, stage_velocity_[i]);
+      add(v, low_.velocity, table.weight[i] * h, stage_acceleration_[i]);
     }
   }
   finish(dynamics, t, t + h, x, v);
@@ -318,10 +318,10 @@ SolveResult Integrator<S>::run(const Nystrom& table, Dynamics<S>& dynamics, Poin
     if (held) dynamics.prescribe(t, from_, t + table.node[i] * h, stage_x_, stage_v_);
     evaluate(dynamics, stage_x_, stage_v_, t + table.node[i] * h, stage_acceleration_[i]);
   }
-  add(x, position_low_, h, v);
+  add(x, low_.position, h, v);
   for (std::size_t i = 0; i < stages; ++i) {
-    if (table.position[i] != 0) add(x, position_low_, table.position[i] * h * h, stage_acceleration_[i]);
-    add(v, velocity_low_, table.velocity[i] * h, stage_acceleration_[i]);
+    if (table.position[i] != 0) add(x, low_.position, table.position[i] * h * h, stage_acceleration_[i]);
+    add(v, low_.velocity, table.velocity[i] * h, stage_acceleration_[i]);
   }
   finish(dynamics, t, t + h, x, v);
   return {};

@@ -5,6 +5,7 @@
 #include <hooke/checkpoint.hpp>
 #include <hooke/implicit_solver.hpp>
 #include <hooke/method.hpp>
+#include <hooke/stepper.hpp>
 #include <hooke/types.hpp>
 
 #include <cstdint>
@@ -111,10 +112,10 @@ class Integrator {
   void save(CheckpointWriter& out) const;
   void load(CheckpointReader& in, Index points);
   /// Drops what compensated sums keep: of all points, or of one whose x or v somebody else has set.
-  void drop_low() { position_low_.setZero(), velocity_low_.setZero(); }
+  void drop_low() { low_.position.setZero(), low_.velocity.setZero(); }
   void drop_low(Index point);
-  /// What x is too small by, (n, 3), or null where nothing is kept.
-  const Points<S>* position_low() const { return position_low_.rows() ? &position_low_ : nullptr; }
+  /// What x and v are too small by. What moves them in its place may change it.
+  LowParts<S>& low() { return low_; }
 
  private:
   SolveResult run(const Splitting&, Dynamics<S>&, Points<S>& x, Points<S>& v, double t, double h);
@@ -139,8 +140,8 @@ class Integrator {
   double adapted_error_ = 1;         // of the last accepted step, in tolerances
   Index adapted_steps_ = 0;
   Work work_;
-  Points<S> position_low_{0, 3}, velocity_low_{0, 3};  // what x and v are too small by
-  Points<S> touched_x_, touched_v_;                    // before a collision
+  LowParts<S> low_;
+  Points<S> touched_x_, touched_v_;  // before a collision
   Points<S> acceleration_, increment_, from_, drift_from_, predicted_;
   std::vector<Points<S>> stage_velocity_, stage_acceleration_;
   Points<S> stage_x_, stage_v_;

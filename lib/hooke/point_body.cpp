@@ -75,7 +75,9 @@ void PointBody<S>::add_field(std::unique_ptr<const ForceField<S>> field) {
                                 " accepts no forces of velocity (drag, dampers, wind)");
   uses_velocity_ = uses_velocity_ || field->uses_velocity();
   fields_.push_back(std::move(field));
-  stepper_ = fields_.size() == 1 ? fields_[0]->stepper() : nullptr;
+  const bool alone = fields_.size() == 1;
+  stepper_ = alone ? fields_[0]->stepper() : nullptr;
+  fine_stepper_ = alone && settings_.compensated && std::is_same_v<S, float> ? fields_[0]->fine_stepper() : nullptr;
   last_estimate_ = -1;
 }
 
@@ -191,13 +193,12 @@ void PointBody<S>::add_force(Index point, const Vec3& force) {
 template <class S>
 Energy PointBody<S>::energy(const Vec3& gravity) const {
   Energy energy;
-  for (Index i = 0; i < size(); ++i) {
-    if (points_.inverse_mass[i] == 0) continue;
-    const double m = double(points_.mass[i]);
-    const Vec3 v = points_.velocity.row(i).matrix().transpose().template cast<double>();
-    const Vec3 x = points_.origin + points_.position.row(i).matrix().transpose().template cast<double>();
-    energy.kinetic += 0.5 * m * v.squaredNorm();
-    energy.gravitational -= m * gravity.dot(x);
+  const auto m = (points_.inverse_mass > S(0)).select(points_.mass, S(0)).template cast<double>();
+  energy.gravitational = -gravity.dot(points_.origin) * m.sum();
+  for (int k = 0; k < 3; ++k) {
+    energy.kinetic += 0.5 * (m * points_.velocity.col(k).template cast<double>().square()).sum();
+    if (gravity[k] != 0)
+      energy.gravitational -= gravity[k] * (m * points_.position.col(k).template cast<double>()).sum();
   }
   for (const auto* fields : {&fields_, &held_fields_})
     for (const auto& field : *fields) energy.elastic += field->potential_energy(points_.position);
@@ -271,10 +272,11 @@ void PointBody<S>::acceleration(const Points<S>& x, const Points<S>& v, double t
     // Only of the state itself is it known what rounding has dropped. Dampers take from what moves fast what that
     // would give it.
     const bool shows = slow_ || !uses_velocity_;
-    const Points<S>* low = shows && &x == &points_.position ? integrator_.position_low() : nullptr;
+    const Points<S>& low = integrator_.low().position;
+    const bool fine = shows && &x == &points_.position && low.rows() > 0;
     for (const auto& field : fields_) {
-      if (low)
-        field->add_fine_force(x, *low, v, t, force_);
+      if (fine)
+        field->add_fine_force(x, low, v, t, force_);
       else
         field->add_force(x, v, t, force_);
     }
@@ -452,7 +454,8 @@ SolveResult PointBody<S>::substep(double t, double h) {
 template <class S>
 bool PointBody<S>::run_fast() {
   const auto* table = std::get_if<Splitting>(&settings_.method->scheme);
-  if (!fused() || slow_ || watching_ || prescribes() || collides()) return false;
+  if (!fused() || (slow_ && !fine_stepper_) || watching_ || prescribes() || collides()) return false;
+  Stepper<S>& stepper = slow_ ? *fine_stepper_ : *stepper_;
   const double h = (tick_.end - tick_.start) / double(substeps_);
   stages_.clear();
   std::int64_t evaluations = 0;
@@ -467,20 +470,28 @@ bool PointBody<S>::run_fast() {
       }
     }
   for (const Stage& stage : stages_) evaluations += stage.kick != 0;
-  stepper_->load(points_, tick_.gravity, pushing_ ? &push_acceleration_ : nullptr);
-  stepper_->run(stages_, tick_.gang);
-  stepper_->store(points_);
-  integrator_.drop_low();
+  stepper.load(points_, integrator_.low(), tick_.gravity, pushing_ ? &push_acceleration_ : nullptr);
+  stepper.run(stages_, tick_.gang);
+  stepper.store(points_, integrator_.low());
+  if (!slow_) integrator_.drop_low();
   integrator_.count(evaluations);
   return true;
 }
 
 template <class S>
-bool PointBody<S>::is_slow() const {
+bool PointBody<S>::rounding_shows(double h, double speed, double size, double gravity) {
+  const double rounding = double(std::numeric_limits<S>::epsilon()) * size;
+  return h * speed < kSlow * rounding || (gravity > 0 && h * h * gravity < kLight * rounding);
+}
+
+template <class S>
+bool PointBody<S>::needs_low() const {
   if (!std::is_same_v<S, float> || !settings_.compensated) return false;
   const double h = (tick_.end - tick_.start) / double(substeps_);
-  const double least = kSlow * double(std::numeric_limits<S>::epsilon()) * double(points_.position.abs().maxCoeff());
-  return h * std::sqrt(double(points_.velocity.square().sum()) / double(size())) < least;
+  const bool stepped = fused() && fine_stepper_;
+  if (stepped && settings_.dt > 0 && h < kFine * checked_limit_) return true;
+  const double speed = std::sqrt(double(points_.velocity.square().sum()) / double(size()));
+  return rounding_shows(h, speed, double(points_.position.abs().maxCoeff()), stepped ? tick_.gravity.norm() : 0);
 }
 
 // All substeps of tick_, or those up to the one that fails.
@@ -488,7 +499,7 @@ template <class S>
 SolveResult PointBody<S>::run_tick() {
   const double length = tick_.end - tick_.start;
   integrator_.restart();
-  slow_ = is_slow();
+  slow_ = needs_low();
   if (settings_.collides && !tick_.colliders.empty())
     contacts_.begin_tick(tick_.colliders, points_, tick_.start, tick_.end, settings_.thickness);
   SolveResult solve;
@@ -883,6 +894,8 @@ void PointBody<S>::save(CheckpointWriter& out) const {
   out.add(step_share_);
   out.add(swing_checked_);
   out.add(exchanged_);
+  out.add(step_checked_);
+  out.add(checked_limit_);
   integrator_.save(out);
   out.end();
 
@@ -948,6 +961,8 @@ void PointBody<S>::load(CheckpointReader& in) {
   step_share_ = in.number<double>("share of the step", 0, 1);
   swing_checked_ = in.number<double>("last look at the swing", -1);
   exchanged_ = in.number<double>("energy exchanged", 0);
+  step_checked_ = in.number<double>("last look at the step", -1);
+  checked_limit_ = in.number<double>("largest stable step", 0, std::numeric_limits<double>::infinity());
   integrator_.load(in, n);
   in.end();
 
@@ -959,7 +974,7 @@ void PointBody<S>::load(CheckpointReader& in) {
   in.end();
   surroundings_known_ = false;
   energy_watch_.forget();
-  free_mass_ = step_checked_ = -1;
+  free_mass_ = -1;
 }
 
 template class PointBody<float>;

@@ -27,8 +27,8 @@ struct MotionSettings {
   /// Integrator::adapt; > 0. The error of a second is about as many times this as steps it takes.
   double tolerance = 1e-6;
   /// In float, sums of positions and velocities keep what rounding drops (see Integrator). Without it what moves
-  /// less than a rounding of its place a substep stays where it is, and what should rest shakes. Bodies that
-  /// steppers move take the general way while they are that slow.
+  /// less than a rounding of its place a substep stays where it is, and what should rest shakes. Steppers make their
+  /// steps in double while rounding shows (PointBody::rounding_shows): that costs about twice as much.
   bool compensated = true;
   /// Bodies of passive fields that lose energy (dampers, drag, friction, global damping, a method that does)
   /// sleep once they are at rest, as PointBody::kQuietSpeed and its neighbours say.
@@ -57,9 +57,14 @@ class PointBody : public Body, protected Dynamics<S> {
   /// surfaces bear taken off, no more is left than this share of its weight or what the rounding of its positions
   /// makes of stiff springs in float.
   static constexpr double kQuietSpeed = 2e-4, kQuietTime = 0.5, kQuietForce = 0.01;
-  /// In float, bodies that move less than so many roundings of their size a substep, RMS over points, are moved where
-  /// sums are compensated: not by steppers.
-  static constexpr double kSlow = 256;
+  /// Float is not enough for substeps in which a body moves less than kSlow roundings of its size, RMS over points;
+  /// for what steppers move also where gravity adds less than kLight of them (the noise of so stiff springs turns a
+  /// sheet's normals by 2°), and at a given substep that is less than kFine of the largest stable one.
+  static constexpr double kSlow = 256, kLight = 0.25, kFine = 0.1;
+  /// True where the first or the second holds.
+  /// @param h substep [s]  @param speed RMS over points [m/s]  @param size largest coordinate [m]
+  /// @param gravity [m/s²]; 0: not looked at
+  static bool rounding_shows(double h, double speed, double size, double gravity);
   /// Σ |f_i| over free points [N] of gravity, fields and contacts, were it at rest where it is. Cost: one evaluation.
   virtual double residual_force(const Vec3& gravity);
 
@@ -171,7 +176,7 @@ class PointBody : public Body, protected Dynamics<S> {
   void hold(Index point);
   SolveResult run_tick();
   bool run_fast();
-  bool is_slow() const;
+  bool needs_low() const;
   StepReport explain(bool finite_state);
   StepReport try_tick();
   void changed(Index point);
@@ -193,7 +198,7 @@ class PointBody : public Body, protected Dynamics<S> {
   Integrator<S> integrator_;
   Contacts<S> contacts_;
   std::vector<std::unique_ptr<const ForceField<S>>> fields_, held_fields_;
-  std::unique_ptr<Stepper<S>> stepper_;  // where there is one for the only field
+  std::unique_ptr<Stepper<S>> stepper_, fine_stepper_;  // where there are ones for the only field
   std::vector<Stage> stages_;
   bool uses_velocity_ = false;
   Points<S> start_, previous_position_, previous_velocity_, force_, damping_product_;
@@ -205,7 +210,7 @@ class PointBody : public Body, protected Dynamics<S> {
   std::vector<Moving> moving_;
   double frame_start_ = 0, frame_end_ = 0;
   Index substeps_ = 0;
-  bool slow_ = false;  // it moves so little a substep that rounding shows
+  bool slow_ = false;  // rounding shows in this tick
   double wanted_dt_ = 0, last_estimate_ = -1;
   double step_share_ = 1, swing_checked_ = -1, exchanged_ = 0;  // of the automatic step; [s]; [J]
   bool passive_ = true;                                         // all fields are

@@ -292,7 +292,7 @@ std::vector<Row> rows_of(const RandomScene& scene, double speed) {
     for (const Precision p : {Precision::Float, Precision::Double})
       out.push_back({&method, p, n,
                      modelled_seconds(scene.body, method, p, evaluations_of(method, scene.ticks, n),
-                                      speed < slow_speed(scene.body, tick / n))});
+                                      rounding_shows(scene.body, tick / n, speed, scene.gravity.norm()))});
   };
   double fewest = 1;
   for (const Method* method :
@@ -404,7 +404,7 @@ int main(int argc, char** argv) {
         choice.method == &implicit_euler()
             ? choice.seconds
             : modelled_seconds(scene.body, *choice.method, choice.precision, choice.evaluations,
-                               ours.speed < slow_speed(scene.body, choice.dt));
+                               rounding_shows(scene.body, choice.dt, ours.speed, scene.gravity.norm()));
     // The cheapest row that meets it. Rows dearer than ours are not looked at: ours then counts as the cheapest.
     std::map<std::pair<const Method*, Precision>, double> coarser;
     Row best{choice.method, choice.precision, double(choice.substeps), cost_of_choice};

@@ -52,7 +52,7 @@ void fused_steps(benchmark::State& state) {
   std::vector<Stage> stages(kSteps, Stage{h, h});
   stages.front().kick = h / 2;
   stages.push_back({h / 2, 0});
-  stepper->load(sheet.points, {0, -9.81, 0}, nullptr);
+  stepper->load(sheet.points, {}, {0, -9.81, 0}, nullptr);
   for (auto _ : state) stepper->run(stages, nullptr);
   per(state, "spring and step", sheet.count * kSteps);
 }
@@ -66,9 +66,10 @@ void load_and_store(benchmark::State& state) {
     state.SkipWithError("this build has no fused kernels");
     return;
   }
+  LowParts<S> low;
   for (auto _ : state) {
-    stepper->load(sheet.points, {0, -9.81, 0}, nullptr);
-    stepper->store(sheet.points);
+    stepper->load(sheet.points, {}, {0, -9.81, 0}, nullptr);
+    stepper->store(sheet.points, low);
   }
   per(state, "spring", sheet.count);
 }

@@ -148,6 +148,46 @@ TYPED_TEST(Stepper, HasTheSameBitsWhereStagesFollowEachOther) {
   EXPECT_TRUE((one.position == two.position).all());
 }
 
+// Where rounding shows a body in float is stepped in double: what its float places drop is kept from tick to tick.
+class FineStepper : public testing::Test {
+ protected:
+  // Velocities after 0.2 s at a share of the largest stable step.
+  static Points<double> end(SoftBodySettings settings, double share, softbody::Precision precision, bool compensated) {
+    settings.motion.dt = share * softbody::make_soft_body(settings)->stable_step(velocity_verlet());
+    settings.precision = precision;
+    settings.motion.compensated = compensated;
+    settings.motion.watches_energy = false;  // which plain float gains
+    World world;
+    Body& body = world.add(softbody::make_soft_body(settings));
+    EXPECT_TRUE(world.update(0.2).good());
+    return body.velocities();
+  }
+
+  static void expect_less_error(SoftBodySettings settings, double share, double times) {
+    // Places and masses that both precisions have.
+    settings.positions = settings.positions.cast<float>().cast<double>();
+    settings.masses = settings.masses.cast<float>().cast<double>();
+    settings.velocities.setZero();
+    const Points<double> exact = end(settings, share, softbody::Precision::Double, true);
+    const double fine = (end(settings, share, softbody::Precision::Float, true) - exact).abs().maxCoeff();
+    const double plain = (end(settings, share, softbody::Precision::Float, false) - exact).abs().maxCoeff();
+    EXPECT_GT(fine, 0);
+    EXPECT_LT(fine, plain / times) << plain << " m/s without";
+  }
+};
+
+TEST_F(FineStepper, KeepsWhatFloatDrops) {
+  for (SoftBodySettings settings : {sheet(17, 12), sheet(17, 12, true)}) {
+    SpringNetwork stiff = *settings.network;
+    for (Spring& spring : stiff.springs) spring.stiffness *= 3e4;
+    settings.network = std::make_shared<const SpringNetwork>(std::move(stiff));
+    expect_less_error(settings, 0.5, 100);
+  }
+}
+
+// Steps far below the stable one ask for accuracy, whatever the speed.
+TEST_F(FineStepper, IsTakenForFineSteps) { expect_less_error(sheet(17, 12), 0.05, 20); }
+
 // Two floats are nearer to double than one, at the same steps.
 TEST(TwoFloats, LoseFarLessThanOne) {
   SoftBodySettings settings = sheet(33, 20);

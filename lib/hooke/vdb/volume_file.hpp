@@ -1,4 +1,5 @@
-// Solids and moving air as OpenVDB files.
+// Solids and moving air as OpenVDB files. OpenVDB's reader (10.0) trusts its input: what is cut off or of another kind
+// is refused, but a few changed bytes can make it write where it must not. Read files from people you trust.
 #pragma once
 
 #include <hooke/distance_grid.hpp>

@@ -193,7 +193,7 @@ class Chooser {
     if (!std::isfinite(limit(velocity_verlet()))) return trivial("nothing limits the step");
     base_ = candidate(velocity_verlet(), Precision::Float, 1);
     const double twice = candidate(velocity_verlet(), Precision::Double, 1).seconds;
-    slow_in_float_ = twice < base_.seconds;
+    steps_in_double_ = twice <= base_.seconds;
     base_.seconds = std::min(base_.seconds, twice);
     if (!filtered_leapfrog_does()) look_at_velocity_verlet();
     return finish();
@@ -227,8 +227,8 @@ class Chooser {
     out.precision = precision;
     out.substeps = steps;
     out.evaluations = evaluations_of(method, double(ticks_), double(steps));
-    const bool slow = speed_ < slow_speed(settings_, tick_ / double(steps));
-    out.seconds = modelled_seconds(settings_, method, precision, out.evaluations, slow);
+    const bool in_double = rounding_shows(settings_, tick_ / double(steps), speed_, run_.gravity.norm());
+    out.seconds = modelled_seconds(settings_, method, precision, out.evaluations, in_double);
     return out;
   }
 
@@ -363,7 +363,7 @@ class Chooser {
     const Method& method = velocity_verlet();
     // Where rounding rules float out.
     const Precision precision =
-        wanted_ >= kRoom * floor_of(base_) && !slow_in_float_ ? Precision::Float : Precision::Double;
+        wanted_ >= kRoom * floor_of(base_) && !steps_in_double_ ? Precision::Float : Precision::Double;
     const Candidate base = candidate(method, precision, 1);
     pair_candidate_[0] = base, pair_candidate_[1] = candidate(method, precision, 2);
     for (int i : {0, 1}) pair_[i] = trial(pair_candidate_[i]);
@@ -573,7 +573,8 @@ class Chooser {
     const auto better = [&](const Candidate& a, const Candidate& b) {
       const bool a_meets = a.predicted_error <= wanted_, b_meets = b.predicted_error <= wanted_;
       if (a_meets != b_meets) return a_meets;
-      return a_meets ? a.seconds < b.seconds : a.predicted_error < b.predicted_error;
+      if (a_meets && a.seconds != b.seconds) return a.seconds < b.seconds;
+      return a.predicted_error < b.predicted_error;
     };
     for (std::size_t i = 1; i < considered_.size(); ++i)
       if (better(considered_[i], considered_[best])) best = i;
@@ -598,30 +599,30 @@ class Chooser {
   Candidate base_, pair_candidate_[2];
   std::unique_ptr<Trial> pair_[2];
   double share_ = 0;
-  bool slow_in_float_ = false, tried_coarse_ = false;
+  bool steps_in_double_ = false, tried_coarse_ = false;
   std::vector<Candidate> considered_;
   SolverChoice choice_;
 };
 
 }  // namespace
 
-double slow_speed(const SoftBodySettings& settings, double h) {
-  const double least = PointBody<float>::kSlow * double(std::numeric_limits<float>::epsilon()) / h;
-  return settings.positions.rows() ? least * settings.positions.abs().maxCoeff() : 0;
+bool rounding_shows(const SoftBodySettings& settings, double h, double speed, double gravity) {
+  const double size = settings.positions.rows() ? settings.positions.abs().maxCoeff() : 0;
+  return PointBody<float>::rounding_shows(h, speed, size, gravity);
 }
 
 double modelled_seconds(const SoftBodySettings& settings, const Method& method, Precision precision, double evaluations,
-                        bool slow) {
-  const bool fused = springs_alone(settings) && std::holds_alternative<Splitting>(method.scheme) &&
-                     !(slow && precision == Precision::Float);
+                        bool in_double) {
+  const bool fused = springs_alone(settings) && std::holds_alternative<Splitting>(method.scheme);
   const CostTable& table = &method == &filtered_leapfrog() ? kFilteredCost
                            : &method == &xpbd()            ? kXpbdCost
                            : !fused                        ? kDampedCost
                            : is_grid(settings)             ? kGridCost
                                                            : kNetworkCost;
   const double springs = settings.network ? double(settings.network->springs.size()) : 0;
-  return 1e-9 * (precision == Precision::Float ? table.single : table.twice) *
-         (springs + double(settings.positions.rows())) * evaluations;
+  const bool stepped = &table == &kGridCost || &table == &kNetworkCost;
+  const bool single = precision == Precision::Float && !(stepped && in_double);
+  return 1e-9 * (single ? table.single : table.twice) * (springs + double(settings.positions.rows())) * evaluations;
 }
 
 ImplicitCost::ImplicitCost(const SoftBodySettings& settings) {

@@ -27,21 +27,21 @@ struct CostTable {
 };
 inline constexpr CostTable kGridCost{0.75, 1.7};    ///< undamped springs of a grid
 inline constexpr CostTable kNetworkCost{2.4, 3.9};  ///< other undamped springs
-/// The general way: other forces, dampers, other methods, slow in float.
+/// The general way: other forces, dampers, other methods.
 inline constexpr CostTable kDampedCost{8, 10};
 inline constexpr CostTable kFilteredCost{1.6, 3.2};  ///< a step of filtered leapfrog
 inline constexpr CostTable kXpbdCost{15, 17};        ///< a sweep of xpbd(), a quarter of its substep's rest included
 inline constexpr CostTable kProductCost{20, 22};     ///< a product of an implicit solve
 
-/// The speed [m/s], RMS over points, below which fused kernels leave a body in float to the general way at steps of h
-/// (MotionSettings::compensated).
-double slow_speed(const SoftBodySettings& settings, double h);
+/// True where this body, with this RMS speed over points [m/s] and gravity [m/s²], is in float at steps of h stepped
+/// in double (MotionSettings::compensated): that costs what double costs.
+bool rounding_shows(const SoftBodySettings& settings, double h, double speed, double gravity);
 
 /// What the table says of `evaluations` of the forces on this body, or sweeps of xpbd().
-/// @param slow it moves more slowly than slow_speed
+/// @param in_double rounding_shows
 /// @return [s]
 double modelled_seconds(const SoftBodySettings& settings, const Method& method, Precision precision, double evaluations,
-                        bool slow = false);
+                        bool in_double = false);
 
 /// What implicit methods cost on a body by the table and counted work, as if every step and every run of products
 /// that is worth it began with a factorisation of the springs' matrix: 1 ns a multiplication in it and in its solves.

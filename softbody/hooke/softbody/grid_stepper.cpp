@@ -359,7 +359,8 @@ constexpr std::size_t kTogether = 4;
 // Bands of fewer points do not pay for their edges.
 constexpr Index kBandPoints = 1500, kBandRows = 8;
 
-// O is the body's scalar, S the kernel's; where they differ, a value is held in two of the latter.
+// O is the body's scalar, S the kernel's. A body in double that is stepped in float has two of them a value; one in
+// float that is stepped in double has its low parts added.
 template <class O, class S>
 class GridStepper final : public Stepper<O> {
  public:
@@ -377,7 +378,7 @@ class GridStepper final : public Stepper<O> {
     make_wakes(state_.together);
   }
 
-  void load(const PointMasses<O>& points, const Vec3& gravity, const Points<O>* push) override {
+  void load(const PointMasses<O>& points, const LowParts<O>& low, const Vec3& gravity, const Points<O>* push) override {
     for (int k = 0; k < 3; ++k) state_.gravity[k] = S(gravity[k]);
     if (push && push_.empty()) push_.resize(std::size_t(state_.rows * state_.blocks * 3 * kBlock));
     state_.push = push ? push_.data() : nullptr;
@@ -390,12 +391,13 @@ class GridStepper final : public Stepper<O> {
         to_blocks(v, r, fields, k, state_.motion, [](O value) { return S(value); });
         if (push) to_blocks(&(*push)(r * columns_, k), r, 3, k, push_.data(), [](O value) { return S(value); });
         if (!kLow) continue;
-        const auto low = [](O value) { return S(value - O(S(value))); };
-        std::transform(x, x + columns_, to + 3 * state_.stride, low);
-        to_blocks(v, r, fields, 4 + k, state_.motion, low);
+        const auto rest = [](O value) { return S(value - O(S(value))); };
+        std::transform(x, x + columns_, to + 3 * state_.stride, rest);
+        to_blocks(v, r, fields, 4 + k, state_.motion, rest);
       }
       to_blocks(&points.inverse_mass[r * columns_], r, fields, 3, state_.motion, [](O value) { return S(value); });
     }
+    if constexpr (kWide) add_low(low);
   }
 
   void run(std::span<const Stage> stages, Gang* gang) override {
@@ -417,8 +419,9 @@ class GridStepper final : public Stepper<O> {
     });
   }
 
-  void store(PointMasses<O>& points) const override {
+  void store(PointMasses<O>& points, LowParts<O>& low_parts) const override {
     const int fields = state_.fields();
+    if constexpr (kWide) low_parts.position.resize(points.size(), 3), low_parts.velocity.resize(points.size(), 3);
     for (Index r = 0; r < state_.rows; ++r)
       for (int k = 0; k < 3; ++k) {
         O *x = &points.position(r * columns_, k), *v = &points.velocity(r * columns_, k);
@@ -430,6 +433,10 @@ class GridStepper final : public Stepper<O> {
           for (Index i = 0; i < n; ++i) {
             x[c + i] = kLow ? O(high[i]) + O(low[i]) : O(high[i]);
             v[c + i] = kLow ? O(v_high[i]) + O(v_low[i]) : O(v_high[i]);
+            if constexpr (kWide) {
+              low_parts.position(r * columns_ + c + i, k) = O(high[i] - S(x[c + i]));
+              low_parts.velocity(r * columns_ + c + i, k) = O(v_high[i] - S(v[c + i]));
+            }
           }
         }
       }
@@ -441,7 +448,18 @@ class GridStepper final : public Stepper<O> {
 
  private:
   static constexpr int kBlock = kColumns<S>;
-  static constexpr bool kLow = !std::is_same_v<O, S>;
+  static constexpr bool kLow = sizeof(O) > sizeof(S), kWide = sizeof(O) < sizeof(S);
+
+  void add_low(const LowParts<O>& low) {
+    for (Index r = 0; r < state_.rows && low.position.rows() > 0; ++r)
+      for (int k = 0; k < 3; ++k)
+        for (Index c = 0; c < columns_; ++c)
+          state_.position(r)[k * state_.stride + c] += low.position(r * columns_ + c, k);
+    for (Index r = 0; r < state_.rows && low.velocity.rows() > 0; ++r)
+      for (int k = 0; k < 3; ++k)
+        for (Index c = 0; c < columns_; ++c)
+          state_.motion[at(r, c, state_.fields(), k)] += low.velocity(r * columns_ + c, k);
+  }
 
   void run_one(std::span<const Stage> stages, int b) {
     if constexpr (std::is_same_v<S, float>)
@@ -492,11 +510,11 @@ class GridStepper final : public Stepper<O> {
           const int index = grid.springs[std::size_t(direction)][std::size_t(point)];
           if (index < 0) continue;
           const Spring& spring = network.springs[std::size_t(index)];
-          stiffness[std::size_t(at(0, c, 6, direction))] = S(spring.stiffness);
+          stiffness[std::size_t(at(0, c, 6, direction))] = S(O(spring.stiffness));
           for (int k = 0; k < 3; ++k)
             difference[std::size_t(k * width + c)] = spring.rest_length == Spring::kFromStart
                                                          ? difference_of(start(spring.a, k), start(spring.b, k))
-                                                         : S(k == 0 ? spring.rest_length : 0);
+                                                         : S(O(k == 0 ? spring.rest_length : 0));
         }
         if constexpr (std::is_same_v<S, float>)
           HWY_DYNAMIC_DISPATCH(squares_float)(width, difference.data(), square.data());
@@ -554,6 +572,11 @@ std::unique_ptr<Stepper<S>> make_grid_stepper(const SpringNetwork& network, cons
 std::unique_ptr<Stepper<double>> make_two_float_grid_stepper(const SpringNetwork& network, const SpringGrid& grid,
                                                              const Points<double>& start) {
   return std::make_unique<GridStepper<double, float>>(network, grid, start);
+}
+
+std::unique_ptr<Stepper<float>> make_fine_grid_stepper(const SpringNetwork& network, const SpringGrid& grid,
+                                                       const Points<float>& start) {
+  return std::make_unique<GridStepper<float, double>>(network, grid, start);
 }
 
 template std::unique_ptr<Stepper<float>> make_grid_stepper(const SpringNetwork&, const SpringGrid&,

@@ -31,4 +31,8 @@ std::unique_ptr<Stepper<S>> make_grid_stepper(const SpringNetwork& network, cons
 std::unique_ptr<Stepper<double>> make_two_float_grid_stepper(const SpringNetwork& network, const SpringGrid& grid,
                                                              const Points<double>& start);
 
+/// A body in float stepped in double, what the rounding of its state drops kept aside. Cost: double's.
+std::unique_ptr<Stepper<float>> make_fine_grid_stepper(const SpringNetwork& network, const SpringGrid& grid,
+                                                       const Points<float>& start);
+
 }  // namespace hooke::softbody

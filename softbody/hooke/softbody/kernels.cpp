@@ -73,6 +73,27 @@ HOOKE_INLINE void springs(SpringBlock<S>& s) {
   for (int k = 0; k < 3; ++k) add(s.sum_b[k], s.f[k], S(-1), s.n);
 }
 
+// Eight sums, whatever the vectors' length: the same bits everywhere.
+template <class S>
+HOOKE_INLINE double energy(const SpringBlock<S>& s) {
+  constexpr int kSums = 8;
+  double stored[kBlock], sums[kSums] = {};
+  const S *ax = s.a[0], *ay = s.a[1], *az = s.a[2], *bx = s.b[0], *by = s.b[1], *bz = s.b[2];
+  const S *k = s.stiffness, *rest = s.rest;
+  const int n = s.n;
+  HOOKE_INDEPENDENT
+  for (int i = 0; i < n; ++i) {
+    const double dx = double(bx[i]) - double(ax[i]), dy = double(by[i]) - double(ay[i]),
+                 dz = double(bz[i]) - double(az[i]);
+    const double stretch = std::sqrt(dx * dx + dy * dy + dz * dz) - double(rest[i]);
+    stored[i] = 0.5 * double(k[i]) * stretch * stretch;
+  }
+  for (int i = n; i < (n + kSums - 1) / kSums * kSums; ++i) stored[i] = 0;
+  for (int i = 0; i < n; i += kSums)
+    for (int j = 0; j < kSums; ++j) sums[j] += stored[i + j];
+  return ((sums[0] + sums[1]) + (sums[2] + sums[3])) + ((sums[4] + sums[5]) + (sums[6] + sums[7]));
+}
+
 template <class S>
 HOOKE_INLINE void bounds(BoundBlock<S>& s) {
   const S *ax = s.a[0], *ay = s.a[1], *az = s.a[2], *bx = s.b[0], *by = s.b[1], *bz = s.b[2];
@@ -161,6 +182,8 @@ HOOKE_INLINE void wind(WindBlock<S>& s) {
 
 HOOKE_CLONES void spring_forces(SpringBlock<float>& block) { springs(block); }
 HOOKE_CLONES void spring_forces(SpringBlock<double>& block) { springs(block); }
+HOOKE_CLONES double spring_energy(const SpringBlock<float>& block) { return energy(block); }
+HOOKE_CLONES double spring_energy(const SpringBlock<double>& block) { return energy(block); }
 HOOKE_CLONES void spring_bounds(BoundBlock<float>& block) { bounds(block); }
 HOOKE_CLONES void spring_bounds(BoundBlock<double>& block) { bounds(block); }
 HOOKE_CLONES void eigenvalue_bounds(int n, const float* const m[6], float* out) { eigenvalues(n, m, out); }

@@ -25,6 +25,10 @@ struct SpringBlock {
 void spring_forces(SpringBlock<float>& block);
 void spring_forces(SpringBlock<double>& block);
 
+/// ½ k (l - L)² of such springs, summed up [J]. Only what the formula asks for has to be set.
+double spring_energy(const SpringBlock<float>& block);
+double spring_energy(const SpringBlock<double>& block);
+
 /// Springs as above, for bounds on their rates: by spring, w k P and w c n nᵀ as xx, xy, xz, yy, yz, zz, where
 /// w = inverse masses of both ends, P the stiffness's direction and n the spring's.
 template <class S>

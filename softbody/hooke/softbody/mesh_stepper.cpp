@@ -240,10 +240,11 @@ HWY_EXPORT(run_mesh_double);
 HWY_EXPORT(mesh_squares_float);
 HWY_EXPORT(mesh_squares_double);
 
-template <class S>
-class MeshStepper final : public Stepper<S> {
+// O is the body's scalar, S the kernel's.
+template <class O, class S>
+class MeshStepper final : public Stepper<O> {
  public:
-  MeshStepper(const SpringNetwork& network, const Points<S>& start) : order_(near_order(network, start.rows())) {
+  MeshStepper(const SpringNetwork& network, const Points<O>& start) : order_(near_order(network, start.rows())) {
     const Index n = start.rows();
     state_.groups = (n + kWidth - 1) / kWidth;
     const std::size_t points = std::size_t(state_.groups) * kWidth;
@@ -252,18 +253,21 @@ class MeshStepper final : public Stepper<S> {
     make_springs(network, start);
   }
 
-  void load(const PointMasses<S>& points, const Vec3& gravity, const Points<S>* push) override {
+  void load(const PointMasses<O>& points, const LowParts<O>& low, const Vec3& gravity, const Points<O>* push) override {
+    const bool low_places = kWide && low.position.rows() > 0, low_motion = kWide && low.velocity.rows() > 0;
     for (int k = 0; k < 3; ++k) state_.gravity[k] = S(gravity[k]);
     if (push && push_.empty()) push_.resize(std::size_t(state_.groups) * 3 * kWidth);
     state_.push = push ? push_.data() : nullptr;
     for (std::size_t i = 0; i < order_.size(); ++i) {
       const Index user = order_[i];
       for (int k = 0; k < 3; ++k) {
-        state_.position[4 * i + std::size_t(k)] = points.position(user, k);
-        state_.motion[at(i, 4, k)] = points.velocity(user, k);
-        if (push) push_.data()[at(i, 3, k)] = (*push)(user, k);
+        state_.position[4 * i + std::size_t(k)] = S(points.position(user, k));
+        state_.motion[at(i, 4, k)] = S(points.velocity(user, k));
+        if (low_places) state_.position[4 * i + std::size_t(k)] += S(low.position(user, k));
+        if (low_motion) state_.motion[at(i, 4, k)] += S(low.velocity(user, k));
+        if (push) push_.data()[at(i, 3, k)] = S((*push)(user, k));
       }
-      state_.motion[at(i, 4, 3)] = points.inverse_mass[user];
+      state_.motion[at(i, 4, 3)] = S(points.inverse_mass[user]);
     }
   }
 
@@ -274,17 +278,21 @@ class MeshStepper final : public Stepper<S> {
       HWY_DYNAMIC_DISPATCH(run_mesh_double)(state_, stages);
   }
 
-  void store(PointMasses<S>& points) const override {
+  void store(PointMasses<O>& points, LowParts<O>& low) const override {
+    if constexpr (kWide) low.position.resize(points.size(), 3), low.velocity.resize(points.size(), 3);
     for (std::size_t i = 0; i < order_.size(); ++i)
       for (int k = 0; k < 3; ++k) {
-        points.position(order_[i], k) = state_.position[4 * i + std::size_t(k)];
-        points.velocity(order_[i], k) = state_.motion[at(i, 4, k)];
+        const S x = state_.position[4 * i + std::size_t(k)], v = state_.motion[at(i, 4, k)];
+        points.position(order_[i], k) = O(x);
+        points.velocity(order_[i], k) = O(v);
+        if constexpr (kWide) low.position(order_[i], k) = O(x - S(O(x))), low.velocity(order_[i], k) = O(v - S(O(v)));
       }
   }
 
-  std::string_view precision() const override { return std::is_same_v<S, float> ? "float" : "double"; }
+  std::string_view precision() const override { return std::is_same_v<O, float> ? "float" : "double"; }
 
  private:
+  static constexpr bool kWide = sizeof(O) < sizeof(S);
   static constexpr std::size_t kWidth = std::size_t(kGroup<S>);
 
   // Of a field of a point, in groups of so many fields.
@@ -292,7 +300,7 @@ class MeshStepper final : public Stepper<S> {
     return (i / kWidth * std::size_t(fields) + std::size_t(field)) * kWidth + i % kWidth;
   }
 
-  void make_springs(const SpringNetwork& network, const Points<S>& start) {
+  void make_springs(const SpringNetwork& network, const Points<O>& start) {
     std::vector<int> place(order_.size());
     for (std::size_t i = 0; i < order_.size(); ++i) place[std::size_t(order_[i])] = int(i);
     // By earlier end, nearest later end first.
@@ -323,11 +331,11 @@ class MeshStepper final : public Stepper<S> {
           if (point >= forward.size() || turn >= forward[point].size()) continue;
           const Spring& spring = network.springs[forward[point][turn].second];
           far_.data()[entry] = 4 * forward[point][turn].first;
-          stiffness[entry] = S(spring.stiffness);
+          stiffness[entry] = S(O(spring.stiffness));
           for (int k = 0; k < 3; ++k)
             difference[std::size_t(k) * entries + entry] = spring.rest_length == Spring::kFromStart
-                                                               ? start(spring.b, k) - start(spring.a, k)
-                                                               : S(k == 0 ? spring.rest_length : 0);
+                                                               ? S(start(spring.b, k)) - S(start(spring.a, k))
+                                                               : S(O(k == 0 ? spring.rest_length : 0));
         }
     if constexpr (std::is_same_v<S, float>)
       HWY_DYNAMIC_DISPATCH(mesh_squares_float)(Index(entries), difference.data(), square.data());
@@ -392,7 +400,11 @@ std::vector<int> near_order(const SpringNetwork& network, Index points) {
 
 template <class S>
 std::unique_ptr<Stepper<S>> make_mesh_stepper(const SpringNetwork& network, const Points<S>& start) {
-  return std::make_unique<MeshStepper<S>>(network, start);
+  return std::make_unique<MeshStepper<S, S>>(network, start);
+}
+
+std::unique_ptr<Stepper<float>> make_fine_mesh_stepper(const SpringNetwork& network, const Points<float>& start) {
+  return std::make_unique<MeshStepper<float, double>>(network, start);
 }
 
 template std::unique_ptr<Stepper<float>> make_mesh_stepper(const SpringNetwork&, const Points<float>&);

@@ -20,6 +20,9 @@ namespace hooke::softbody {
 template <class S>
 std::unique_ptr<Stepper<S>> make_mesh_stepper(const SpringNetwork& network, const Points<S>& start);
 
+/// A body in float stepped in double, what the rounding of its state drops kept aside. Cost: double's.
+std::unique_ptr<Stepper<float>> make_fine_mesh_stepper(const SpringNetwork& network, const Points<float>& start);
+
 /// Reverse Cuthill-McKee: points in an order in which springs join near ones (Cuthill & McKee 1969).
 std::vector<int> near_order(const SpringNetwork& network, Index points);
 

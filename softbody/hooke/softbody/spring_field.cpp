@@ -201,10 +201,20 @@ void SpringField<S>::add_couplings(const Points<S>& x, const Points<S>&, double 
 template <class S>
 double SpringField<S>::potential_energy(const Points<S>& x) const {
   double sum = 0;
-  for (Index i = 0; i < size(); ++i) {
-    const Vec3 d = (x.row(b_[std::size_t(i)]) - x.row(a_[std::size_t(i)])).matrix().transpose().template cast<double>();
-    const double stretch = d.norm() - double(rest_[i]);
-    sum += 0.5 * double(stiffness_[i]) * stretch * stretch;
+  SpringBlock<S> block;
+  S gathered[6][kBlock];
+  for (int k = 0; k < 3; ++k) block.a[k] = gathered[k], block.b[k] = gathered[3 + k];
+  for (Index first = 0; first < size(); first += kBlock) {
+    block.n = int(std::min<Index>(kBlock, size() - first));
+    block.stiffness = stiffness_.data() + first, block.rest = rest_.data() + first;
+    for (int k = 0; k < 3; ++k) {
+      const S* column = x.col(k).data();
+      for (int i = 0; i < block.n; ++i) {
+        gathered[k][i] = column[a_[std::size_t(first + i)]];
+        gathered[3 + k][i] = column[b_[std::size_t(first + i)]];
+      }
+    }
+    sum += spring_energy(block);
   }
   return sum;
 }
@@ -277,16 +287,23 @@ typename ForceField<S>::Rates SpringField<S>::rate_bounds(const Points<S>& x, co
 }
 
 template <class S>
-std::unique_ptr<Stepper<S>> SpringField<S>::stepper() const {
+std::unique_ptr<Stepper<S>> SpringField<S>::any_stepper([[maybe_unused]] bool fine) const {
   if (damped_) return nullptr;
 #if HOOKE_HAS_HIGHWAY
   try {
     const SpringGrid grid = SpringGrid::of(*network_, start_.rows());
-    if constexpr (std::is_same_v<S, double>)
+    if constexpr (std::is_same_v<S, float>) {
+      if (fine) return make_fine_grid_stepper(*network_, grid, start_);
+    } else {
+      if (fine) return nullptr;
       if (two_floats_) return make_two_float_grid_stepper(*network_, grid, start_);
+    }
     return make_grid_stepper(*network_, grid, start_);
   } catch (const std::invalid_argument&) {
     // Not a grid.
+    if constexpr (std::is_same_v<S, float>)
+      if (fine) return make_fine_mesh_stepper(*network_, start_);
+    if (fine) return nullptr;
     return two_floats_ ? nullptr : make_mesh_stepper(*network_, start_);
   }
 #else

@@ -40,7 +40,8 @@ class SpringField final : public ForceField<S> {
                                             const Values<S>& inverse_mass) const override;
 
   /// Force and step in one pass: for springs without dampers, where the build has Highway.
-  std::unique_ptr<Stepper<S>> stepper() const override;
+  std::unique_ptr<Stepper<S>> stepper() const override { return any_stepper(false); }
+  std::unique_ptr<Stepper<S>> fine_stepper() const override { return any_stepper(true); }
 
   void describe(Blueprint& out) const override;
 
@@ -49,6 +50,7 @@ class SpringField final : public ForceField<S> {
     Index first, count, a, b;
   };
   Index size() const { return stiffness_.size(); }
+  std::unique_ptr<Stepper<S>> any_stepper(bool fine) const;
   void add_forces(const Points<S>& x, const Points<S>* low, const Points<S>& v, Points<S>& f) const;
 
   std::shared_ptr<const SpringNetwork> network_;
