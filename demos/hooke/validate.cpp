@@ -3,6 +3,7 @@
 #include <hooke/error.hpp>
 #include <hooke/method.hpp>
 #include <scene/library.hpp>
+#include <scene/panels.hpp>
 
 #include <cmath>
 #include <cstdio>
@@ -80,8 +81,12 @@ int validate(const std::string& name) {
 }
 
 int list() {
-  for (const scene::NamedScene& scene : scene::named_scenes())
-    std::printf("%-24s %s\n", scene.name.c_str(), scene.title.c_str());
+  const auto print = [](const std::vector<scene::NamedScene>& scenes) {
+    for (const scene::NamedScene& scene : scenes) std::printf("%-24s %s\n", scene.name.c_str(), scene.title.c_str());
+  };
+  print(scene::named_scenes());
+  std::printf("\nSide by side (hooke panels NAME):\n");
+  print(scene::named_panels());
   return kDone;
 }
 

@@ -32,22 +32,36 @@ std::filesystem::path scene_file(const std::string& name) {
   return {};
 }
 
-std::vector<NamedScene> named_scenes() {
-  std::vector<NamedScene> out;
-  for (const StandardScene& scene : standard_scenes())
-    if (scene.description) out.push_back({scene.name, scene.title});
+void add_named_files(const std::string& subfolder,
+                     const std::function<std::string(const std::filesystem::path&)>& title_of,
+                     std::vector<NamedScene>& out) {
+  std::error_code none;
   for (const auto& folder : scene_folders())
-    for (const auto& entry : std::filesystem::directory_iterator(folder)) {
+    for (const auto& entry : std::filesystem::directory_iterator(folder / subfolder, none)) {
       if (entry.path().extension() != ".json") continue;
       const std::string name = entry.path().stem();
       if (std::any_of(out.begin(), out.end(), [&](const NamedScene& scene) { return scene.name == name; })) continue;
       try {
-        out.push_back({name, read_scene(entry.path()).title});
+        out.push_back({name, title_of(entry.path())});
       } catch (const Error& error) {
         out.push_back({name, error.what()});
       }
     }
   std::sort(out.begin(), out.end(), [](const NamedScene& a, const NamedScene& b) { return a.name < b.name; });
+}
+
+std::string names_of(const std::vector<NamedScene>& scenes) {
+  std::string out;
+  for (const NamedScene& scene : scenes) out += (out.empty() ? "" : ", ") + scene.name;
+  return out;
+}
+
+std::vector<NamedScene> named_scenes() {
+  std::vector<NamedScene> out;
+  for (const StandardScene& scene : standard_scenes())
+    if (scene.description) out.push_back({scene.name, scene.title});
+  add_named_files(
+      "", [](const auto& path) { return read_scene(path).title; }, out);
   return out;
 }
 
@@ -61,9 +75,8 @@ SceneDescription find_scene(const std::string& path_or_name) {
     throw Error(path_or_name + " is a scene of the report alone (hooke report): no scene file can say it");
   }
   if (const auto path = scene_file(path_or_name); !path.empty()) return read_scene(path);
-  std::string names;
-  for (const NamedScene& scene : named_scenes()) names += (names.empty() ? "" : ", ") + scene.name;
-  throw Error(path_or_name + ": there is no such scene file, nor a scene of that name; there are " + names);
+  throw Error(path_or_name + ": there is no such scene file, nor a scene of that name; there are " +
+              names_of(named_scenes()));
 }
 
 }  // namespace hooke::scene

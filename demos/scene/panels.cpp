@@ -99,9 +99,15 @@ Panels find_panels(const std::string& path_or_name) {
   std::error_code error;
   if (std::filesystem::exists(path_or_name, error)) return read_panels(path_or_name);
   if (const auto path = scene_file("panels/" + path_or_name); !path.empty()) return read_panels(path);
-  throw Error(path_or_name +
-              ": there is no such file of panels, nor one of that name among the scenes that come with "
-              "Hooke");
+  throw Error(path_or_name + ": there is no such file of panels, nor panels of that name; there are " +
+              names_of(named_panels()));
+}
+
+std::vector<NamedScene> named_panels() {
+  std::vector<NamedScene> out;
+  add_named_files(
+      "panels", [](const auto& path) { return read_panels(path).title; }, out);
+  return out;
 }
 
 }  // namespace hooke::scene

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <scene/description.hpp>
+#include <scene/library.hpp>
 
 #include <filesystem>
 #include <string>
@@ -34,5 +35,8 @@ Panels read_panels(const std::filesystem::path& path);
 /// Panels by path or by the name of a file that comes with Hooke.
 /// @throws hooke::Error as read_panels, and where there is no such file
 Panels find_panels(const std::string& path_or_name);
+
+/// All panels that have a name, sorted.
+std::vector<NamedScene> named_panels();
 
 }  // namespace hooke::scene

@@ -343,6 +343,7 @@ TEST_F(Command, ListsScenesAndHelps) {
     EXPECT_EQ(result.code, 0);
     EXPECT_THAT(result.out, HasSubstr("hanging-sheet-64"));
     EXPECT_THAT(result.out, HasSubstr("cape"));
+    EXPECT_THAT(result.out, HasSubstr("six-methods"));
   }
   for (const char* help : {"--help", "simulate --help", "render --help", "validate --help"}) {
     const Result result = run(help);

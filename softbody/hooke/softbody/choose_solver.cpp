@@ -20,10 +20,16 @@ namespace {
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 // Steps are kept at this share of the largest stable one.
 constexpr double kStepSafety = 0.9;
-// Predicted errors times this must be below the wanted one, by order 2 and by higher orders.
-constexpr double kSafety = 2, kHighSafety = 3;
+// Predicted errors times this must be below the wanted one, by order 2, by higher orders, where it costs few steps, and
+// by methods that damp.
+constexpr double kSafety = 2, kHighSafety = 4, kCoarseSafety = 3;
 // Rounding in float moves points by this share of the size times √steps (measured on sheets, chains and boxes).
 constexpr double kFloatFloor = 1.2e-8;
+// Velocity Verlet at its limit is compared with so many times as many steps. The difference tells its error at order 2;
+// where motion is rough it is more, so this times as much is taken.
+constexpr double kPairSteps = 1.5, kPairRough = 1.1;
+// Errors of higher orders are judged over this share of the run.
+constexpr double kJudgedShare = 1.0 / 16;
 // What rounding alone may take must be so much less than the wanted error.
 constexpr double kRoom = 1.3;
 // Errors grow as a power of time between these; measured ones beyond are not believed.
@@ -329,7 +335,7 @@ class Chooser {
     return false;
   }
 
-  // The pair of trials of velocity Verlet, at the limit and at half of it, on to a share of the run.
+  // The pair of trials of velocity Verlet, at the limit and below it, on to a share of the run.
   void extend_pair(double share) {
     share_ = share;
     for (int i : {0, 1})
@@ -343,12 +349,15 @@ class Chooser {
     speed_ = now * std::pow(std::max(1.0, 0.6 / shown(share)), power);
   }
 
-  // Error at the limit as the pair tells it: 4/3 of the difference at order 2, twice where motion is rough. Where it
-  // is not more than rounding, of which the finer one has more, it is as much as that.
+  double pair_ratio() const { return double(pair_candidate_[1].substeps) / double(pair_candidate_[0].substeps); }
+
+  // Error at the limit as the pair tells it. Where it is not more than rounding, of which the finer one has more, it is
+  // as much as that.
   double pair_error(double share) const {
     const double seen = difference(*pair_[0], *pair_[1], tick_of(share), stride_);
-    const double rounding = std::sqrt(3 * shown(share)) * floor_of(pair_candidate_[0]);
-    return seen < 3 * rounding ? seen / std::sqrt(3.0) : 1.5 * seen;
+    const double times = pair_ratio(), of_both = std::sqrt(1 + times);
+    const double rounding = of_both * std::sqrt(shown(share)) * floor_of(pair_candidate_[0]);
+    return seen < 3 * rounding ? seen / of_both : kPairRough * seen / (1 - 1 / (times * times));
   }
 
   // Dampers let errors settle; rounding adds up faster than it is seen to begin with.
@@ -365,7 +374,7 @@ class Chooser {
     const Precision precision =
         wanted_ >= kRoom * floor_of(base_) && !steps_in_double_ ? Precision::Float : Precision::Double;
     const Candidate base = candidate(method, precision, 1);
-    pair_candidate_[0] = base, pair_candidate_[1] = candidate(method, precision, 2);
+    pair_candidate_[0] = base, pair_candidate_[1] = candidate(method, precision, kPairSteps);
     for (int i : {0, 1}) pair_[i] = trial(pair_candidate_[i]);
     const auto enough = [&](double error, const char* how) {
       try_semi_implicit_euler(precision);
@@ -386,7 +395,7 @@ class Chooser {
       extend_pair(1.0 / 32);
       if (try_coarse_steps()) return;
     }
-    for (const double share : {1.0 / 16, 1.0 / 8, 1.0 / 4}) {
+    for (const double share : {1.0 / 32, 1.0 / 16, 1.0 / 8, 1.0 / 4}) {
       extend_pair(share);
       const Forecast now = forecast();
       if (kSafety * now.high <= wanted_) return enough(now.high, "less than");
@@ -441,13 +450,13 @@ class Chooser {
         if (!reach_coarse(*now, c, stride_, most) || !reach_coarse(*now, c, first, most)) return;
         double seen = difference(*now, *pair_[0], first, stride_);
         double grown = 1 / shown(share_);
-        if (kHighSafety * seen * grown <= wanted_) {
+        if (kCoarseSafety * seen * grown <= wanted_) {
           if (pair_[0]->done() < judged) reach(*pair_[0], pair_candidate_[0], judged);
           if (!reach_coarse(*now, c, judged, most)) return;
           seen = difference(*now, *pair_[0], judged, stride_);
           const double half = difference(*now, *pair_[0], std::max(stride_, judged / 2), stride_);
           const double error = Forecast(seen, half, share, kCoarseGrowth).likely;
-          if (kHighSafety * error <= wanted_) {
+          if (kCoarseSafety * error <= wanted_) {
             consider(c, std::max(error, floor_of(c)));
             choice_.reason =
                 format("velocity Verlet, run over the first %.3g, sees it err by %.1e m there", share, seen);
@@ -457,7 +466,7 @@ class Chooser {
         }
         // Errors fall at order 1 to 2. Too far off?
         const double order = std::clamp(std::log2(before / seen), 1.0, 2.0);
-        if (std::pow(kHighSafety * seen * grown / wanted_, 1 / order) * c.seconds > 1.5 * most) return;
+        if (std::pow(kCoarseSafety * seen * grown / wanted_, 1 / order) * c.seconds > 1.5 * most) return;
         before = seen;
       }
     } catch (const std::exception&) {
@@ -488,7 +497,7 @@ class Chooser {
   void refine(Forecast seen) {
     const Precision precision = pair_candidate_[0].precision;
     if (share_ >= 0.25 && kSafety * seen.likely <= 2 * wanted_) {
-      // At order 1 the pair tells three quarters of the error.
+      // At order 1 the pair tells two thirds of the error.
       const double by_order = 1.5 * kSafety * seen.likely / wanted_;
       Candidate c = candidate(velocity_verlet(), precision, std::sqrt(by_order));
       consider(c, std::max(wanted_ / kSafety, floor_of(c)));
@@ -497,8 +506,8 @@ class Chooser {
                  shown(share_), seen.likely);
       return;
     }
-    if (share_ < 1.0 / 8) {
-      extend_pair(1.0 / 8);
+    if (share_ < kJudgedShare) {
+      extend_pair(kJudgedShare);
       seen = forecast();
     }
     // Where what is needed costs several times more, the growth of errors is looked at to the end.
@@ -510,7 +519,7 @@ class Chooser {
     const double whole = share_ == 1 ? pair_error(1) : seen.likely;
 
     // The next order as judge of both, over a first part.
-    const double part = 1.0 / 8;
+    const double part = kJudgedShare;
     const double here = pair_error(part);
     const double growth = here > 0 && std::isfinite(whole) ? std::max(1.0, whole / here) : 1;
     // In float the differences would be its rounding.
@@ -520,7 +529,8 @@ class Chooser {
     reach(*judge, high, tick_of(part));
     const double e1 = difference(*pair_[0], *judge, tick_of(part), stride_);
     const double e2 = difference(*pair_[1], *judge, tick_of(part), stride_);
-    const double order = e2 > 0 && std::isfinite(e1) ? std::clamp(std::log2(e1 / e2), 0.5, 2.0) : 2;
+    const double order =
+        e2 > 0 && std::isfinite(e1) ? std::clamp(std::log(e1 / e2) / std::log(pair_ratio()), 0.5, 2.0) : 2;
     const double error = e1 * growth;
     add_finer(velocity_verlet(), error, order, kSafety, 8);
 
@@ -534,14 +544,24 @@ class Chooser {
       reach(*better, finest, tick_of(part));
       high_error = difference(*judge, *better, tick_of(part), stride_) * growth;
       if (highest_) {
-        double highest_error = high_error / 4;
+        double highest_error = high_error / 4, highest_order = smooth ? 5 : high_order;
         if (!(kHighSafety * high_error / std::pow(2.6, high_order) <= wanted_)) {
-          const Candidate half = candidate(*highest_, judging, 2);
-          const auto best = trial(half);
-          reach(*best, half, tick_of(part));
-          highest_error = difference(*better, *best, tick_of(part), stride_) * growth;
+          const auto run = [&](double times) {
+            const Candidate c = candidate(*highest_, judging, times);
+            auto out = trial(c);
+            reach(*out, c, tick_of(part));
+            return out;
+          };
+          const auto best = run(2);
+          const double now = difference(*better, *best, tick_of(part), stride_);
+          highest_error = now * growth;
+          // Where the rule asks for many more steps its own order is worth a look.
+          if (kHighSafety * highest_error > std::pow(2.0, highest_order) * wanted_) {
+            const double next = difference(*best, *run(4), tick_of(part), stride_);
+            if (next > 0) highest_order = std::clamp(std::log2(now / next), highest_order, 5.0);
+          }
         }
-        add_finer(*highest_, highest_error, smooth ? 5 : high_order, kHighSafety, 8);
+        add_finer(*highest_, highest_error, highest_order, kHighSafety, 8);
       }
     }
     add_finer(*high_, high_error, high_order, kHighSafety, 8);

@@ -19,6 +19,8 @@ constexpr double kDefaultStep = 1.0 / 1200;  // [s]
 constexpr double kFollow = 0.3;
 // It is safe where what moves has less than this share of the energy that is yet to be made up, for some time [s].
 constexpr double kQuiet = 0.02, kQuietTime = 0.5;
+// What has less than this share of it left does not swing, and is forgotten within this time [s].
+constexpr double kStill = 1e-4, kStillTime = 0.03;
 // … and otherwise as far as it brings in no more than this share of what is lost.
 constexpr double kShareOfLoss = 0.5;
 // The largest carried force, in l / (h² (w_a + w_b)); at 30, a heavy corner at steps of 1/60 s grew without bound.
@@ -486,7 +488,8 @@ void XpbdBody<S>::judge(double h) {
     missing += (force - carried) * (stretch - double(link.compliance) * carried);
   }
   const double tick = h * double(memory_.substeps), lost = memory_.lost / double(memory_.substeps);
-  memory_.held = std::max(memory_.kinetic, memory_.held * std::exp(-tick / kQuietTime));
+  const double forget = memory_.kinetic < kStill * memory_.held ? kStillTime : kQuietTime;
+  memory_.held = std::max(memory_.kinetic, memory_.held * std::exp(-tick / forget));
   const double most = std::min(1.0, h / kFollow);
   memory_.follow = 0;
   if (missing > 0) {
