@@ -578,7 +578,7 @@ StepReport PointBody<S>::try_tick() {
 // size and no more than the way of any of its points: differences that float holds exactly, so no point moves.
 template <class S>
 void PointBody<S>::follow() {
-  if (!std::is_same_v<S, float> || !may_follow_) return;
+  if (!std::is_same_v<S, float> || !settings_.compensated || !may_follow_) return;
   const double far = double(points_.position.row(0).abs().maxCoeff());
   if (far <= known_reach_) return;
   const Vec3 low = points_.position.colwise().minCoeff().matrix().transpose().template cast<double>();

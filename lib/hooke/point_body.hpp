@@ -26,9 +26,10 @@ struct MotionSettings {
   /// Adaptive methods with dt = 0: most that the estimated error of a step may be [m], as in
   /// Integrator::adapt; > 0. The error of a second is about as many times this as steps it takes.
   double tolerance = 1e-6;
-  /// In float, sums of positions and velocities keep what rounding drops (see Integrator). Without it what moves
-  /// less than a rounding of its place a substep stays where it is, and what should rest shakes. Steppers make their
-  /// steps in double while rounding shows (PointBody::rounding_shows): that costs about twice as much.
+  /// In float, sums of positions and velocities keep what rounding drops (see Integrator), steppers make their steps in
+  /// double while rounding shows (PointBody::rounding_shows; about twice the cost), and the body's origin follows it.
+  /// Without it: plain float. What moves less than a rounding of its place a substep stays where it is, and what should
+  /// rest shakes.
   bool compensated = true;
   /// Bodies of passive fields that lose energy (dampers, drag, friction, global damping, a method that does)
   /// sleep once they are at rest, as PointBody::kQuietSpeed and its neighbours say.

@@ -59,6 +59,19 @@ TEST(Body, FarFromTheOriginMovesBitwiseTheSame) {
   for (const double offset : {1.0, 10.0, 100.0, 1000.0, 1e6}) EXPECT_TRUE((fall(offset) == here).all()) << offset;
 }
 
+TEST(Body, ItsOriginFollowsItUnlessItIsPlainFloat) {
+  for (const bool compensated : {true, false}) {
+    MotionSettings settings;
+    settings.compensated = compensated;
+    World world(60);
+    world.enable_gravity(false);
+    auto& body = world.add(body_of(point<float>({1000.25, 0, 0}, {64, 0, 0}), settings));
+    ASSERT_TRUE(world.update(1).good());
+    EXPECT_NEAR(body.positions()(0, 0), 1064.25, 0.01);
+    EXPECT_EQ(body.state().origin.x() > 1000, compensated);
+  }
+}
+
 TEST(Body, BetweenTicksIsOnTheLineBetweenThem) {
   World world(10);
   world.enable_gravity(false);

@@ -28,8 +28,11 @@ constexpr double kFloatFloor = 1.2e-8;
 // Velocity Verlet at its limit is compared with so many times as many steps. The difference tells its error at order 2;
 // where motion is rough it is more, so this times as much is taken.
 constexpr double kPairSteps = 1.5, kPairRough = 1.1;
-// Errors of higher orders are judged over this share of the run.
-constexpr double kJudgedShare = 1.0 / 16;
+// Where it is not enough its growth is followed over the first share of the run at least, and errors of higher orders
+// are judged over the second.
+constexpr double kPairShare = 1.0 / 8, kJudgedShare = 1.0 / 16;
+// The judge may find so many times the error that the pair tells: at order 0.5.
+constexpr double kMostJudged = 3;
 // What rounding alone may take must be so much less than the wanted error.
 constexpr double kRoom = 1.3;
 // Errors grow as a power of time between these; measured ones beyond are not believed.
@@ -506,8 +509,8 @@ class Chooser {
                  shown(share_), seen.likely);
       return;
     }
-    if (share_ < kJudgedShare) {
-      extend_pair(kJudgedShare);
+    if (share_ < kPairShare) {
+      extend_pair(kPairShare);
       seen = forecast();
     }
     // Where what is needed costs several times more, the growth of errors is looked at to the end.
@@ -524,44 +527,46 @@ class Chooser {
     const double growth = here > 0 && std::isfinite(whole) ? std::max(1.0, whole / here) : 1;
     // In float the differences would be its rounding.
     const Precision judging = wanted_ < 30 * floor_of(base_) ? Precision::Double : precision;
-    const Candidate high = candidate(*high_, judging, 1);
-    const auto judge = trial(high);
-    reach(*judge, high, tick_of(part));
-    const double e1 = difference(*pair_[0], *judge, tick_of(part), stride_);
-    const double e2 = difference(*pair_[1], *judge, tick_of(part), stride_);
+    const auto run = [&](const Method& method, double times) {
+      const Candidate c = candidate(method, judging, times);
+      auto out = trial(c);
+      reach(*out, c, tick_of(part));
+      return out;
+    };
+    const auto between = [&](const Trial& a, const Trial& b) { return difference(a, b, tick_of(part), stride_); };
+    const auto judge = run(*high_, 1);
+    const double e1 = between(*pair_[0], *judge), e2 = between(*pair_[1], *judge);
     const double order =
         e2 > 0 && std::isfinite(e1) ? std::clamp(std::log(e1 / e2) / std::log(pair_ratio()), 0.5, 2.0) : 2;
-    const double error = e1 * growth;
+    // A judge that is seen to differ by more than that from the pair may be the worse one.
+    const double error = std::min(e1, kMostJudged * here) * growth;
     add_finer(velocity_verlet(), error, order, kSafety, 8);
 
     // Its own error: first by a rule that holds for rough and smooth motion alike, then seen.
     const bool smooth = order > 1.7;
-    const double high_order = smooth ? 3.5 : 2 * order;
+    double high_order = smooth ? 3.5 : 2 * order;
     double high_error = error / 16;
+    // The order of a method whose error at the limit is known from a trial with twice the steps, where it would take
+    // more than those: then it is worth a look.
+    const auto own_order = [&](const Method& method, const Trial& twice, double seen_error, double by_rule,
+                               double most) {
+      if (!(kHighSafety * seen_error > std::pow(2.0, by_rule) * wanted_)) return by_rule;
+      const double next = between(twice, *run(method, 4)) * growth;
+      return next > 0 ? std::clamp(std::log2(seen_error / next), by_rule, most) : by_rule;
+    };
     if (!highest_ || !(kHighSafety * high_error <= wanted_)) {
-      const Candidate finest = highest_ ? candidate(*highest_, judging, 1) : candidate(*high_, judging, 2);
-      const auto better = trial(finest);
-      reach(*better, finest, tick_of(part));
-      high_error = difference(*judge, *better, tick_of(part), stride_) * growth;
+      const auto better = highest_ ? run(*highest_, 1) : run(*high_, 2);
+      high_error = between(*judge, *better) * growth;
       if (highest_) {
         double highest_error = high_error / 4, highest_order = smooth ? 5 : high_order;
         if (!(kHighSafety * high_error / std::pow(2.6, high_order) <= wanted_)) {
-          const auto run = [&](double times) {
-            const Candidate c = candidate(*highest_, judging, times);
-            auto out = trial(c);
-            reach(*out, c, tick_of(part));
-            return out;
-          };
-          const auto best = run(2);
-          const double now = difference(*better, *best, tick_of(part), stride_);
-          highest_error = now * growth;
-          // Where the rule asks for many more steps its own order is worth a look.
-          if (kHighSafety * highest_error > std::pow(2.0, highest_order) * wanted_) {
-            const double next = difference(*best, *run(4), tick_of(part), stride_);
-            if (next > 0) highest_order = std::clamp(std::log2(now / next), highest_order, 5.0);
-          }
+          const auto best = run(*highest_, 2);
+          highest_error = between(*better, *best) * growth;
+          highest_order = own_order(*highest_, *best, highest_error, highest_order, 5);
         }
         add_finer(*highest_, highest_error, highest_order, kHighSafety, 8);
+      } else {
+        high_order = own_order(*high_, *better, high_error, high_order, 3.5);
       }
     }
     add_finer(*high_, high_error, high_order, kHighSafety, 8);
