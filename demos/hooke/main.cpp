@@ -132,7 +132,7 @@ int dispatch(int argc, char** argv) {
   stability_command->add_option("--threads", a.stability.threads, "Threads that share the rows");
   stability_command->footer("Example: hooke stability mass-ratio-chain rest --out stability");
 
-  CLI::App* list_command = app.add_subcommand("list", "The scenes that have a name");
+  CLI::App* list_command = app.add_subcommand("list", "The scenes and panels that have a name");
   list_command->footer("Example: hooke list");
   app.require_subcommand(0, 1);
 

@@ -77,7 +77,9 @@ void PointBody<S>::add_field(std::unique_ptr<const ForceField<S>> field) {
   fields_.push_back(std::move(field));
   const bool alone = fields_.size() == 1;
   stepper_ = alone ? fields_[0]->stepper() : nullptr;
-  fine_stepper_ = alone && settings_.compensated && std::is_same_v<S, float> ? fields_[0]->fine_stepper() : nullptr;
+  const bool fine = stepper_ && settings_.compensated && std::is_same_v<S, float> &&
+                    std::holds_alternative<Splitting>(settings_.method->scheme);
+  fine_stepper_ = fine ? fields_[0]->fine_stepper() : nullptr;
   last_estimate_ = -1;
 }
 
@@ -489,7 +491,7 @@ bool PointBody<S>::needs_low() const {
   if (!std::is_same_v<S, float> || !settings_.compensated) return false;
   const double h = (tick_.end - tick_.start) / double(substeps_);
   const bool stepped = fused() && fine_stepper_;
-  if (stepped && settings_.dt > 0 && h < kFine * checked_limit_) return true;
+  if (stepped && settings_.dt > 0 && std::isfinite(checked_limit_) && h < kFine * checked_limit_) return true;
   const double speed = std::sqrt(double(points_.velocity.square().sum()) / double(size()));
   return rounding_shows(h, speed, double(points_.position.abs().maxCoeff()), stepped ? tick_.gravity.norm() : 0);
 }

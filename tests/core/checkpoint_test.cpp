@@ -136,6 +136,19 @@ Story hanging(const Method& method, Precision precision, bool contacts, bool dri
           act_on_sheet};
 }
 
+// In float, stepped in double: what the state drops goes on, too.
+Story fine_steps() {
+  return {"fine steps",
+          [] {
+            auto world = std::make_unique<World>(240);
+            auto settings = sheet(velocity_verlet(), Precision::Float, 6, false);
+            settings.motion.dt = 0.05 * softbody::make_soft_body(settings)->stable_step(velocity_verlet());
+            world->add(softbody::make_soft_body(settings));
+            return world;
+          },
+          act_on_sheet};
+}
+
 template <class S>
 Story snooker() {
   return {"linear bodies", [] {
@@ -217,6 +230,7 @@ std::vector<Story> stories() {
     for (const bool contacts : {false, true})
       for (const bool driven : {false, true})
         out.push_back(hanging(softbody::filtered_leapfrog(), precision, contacts, driven));
+  out.push_back(fine_steps());
   out.push_back(snooker<float>());
   out.push_back(snooker<double>());
   for (const Method* method : {&verlet(), &rk4(), &implicit_euler(), &dormand_prince()}) {

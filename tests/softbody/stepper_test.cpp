@@ -131,27 +131,36 @@ TYPED_TEST(Stepper, IsTheGeneralMethodOnMeshesInAnyOrder) {
 // Bands meet at rows that both work on; stages without a kick, pushes and uneven bands included. Short: threads
 // that outnumber the processors wait for each other's turn.
 TYPED_TEST(Stepper, HasTheSameBitsAtAnyThreadCount) {
-  for (const Method* method : {&velocity_verlet(), &pefrl()}) {
-    const Run one = run<TypeParam>(sheet(90, 71), *method, false, 1, 1.0 / 60);
-    for (const int threads : {2, 3, 4}) {
-      const Run many = run<TypeParam>(sheet(90, 71), *method, false, threads, 1.0 / 60);
-      EXPECT_TRUE((one.position == many.position).all()) << threads << " threads, " << method->name;
-      EXPECT_TRUE((one.velocity == many.velocity).all()) << threads << " threads, " << method->name;
+  // Plain float as well as what is stepped in double.
+  for (const bool compensated : {true, false}) {
+    SoftBodySettings settings = sheet(90, 71);
+    settings.motion.compensated = compensated;
+    for (const Method* method : {&velocity_verlet(), &pefrl()}) {
+      const Run one = run<TypeParam>(settings, *method, false, 1, 1.0 / 60);
+      for (const int threads : {2, 3, 4}) {
+        const Run many = run<TypeParam>(settings, *method, false, threads, 1.0 / 60);
+        EXPECT_TRUE((one.position == many.position).all()) << threads << " threads, " << method->name;
+        EXPECT_TRUE((one.velocity == many.velocity).all()) << threads << " threads, " << method->name;
+      }
     }
   }
 }
 
 // Large grids run several stages down their rows at once; one band a thread does not.
 TYPED_TEST(Stepper, HasTheSameBitsWhereStagesFollowEachOther) {
-  const Run one = run<TypeParam>(sheet(300, 150), velocity_verlet(), false, 1, 1.0 / 60);
-  const Run two = run<TypeParam>(sheet(300, 150), velocity_verlet(), false, 2, 1.0 / 60);
-  EXPECT_TRUE((one.position == two.position).all());
+  for (const bool compensated : {true, false}) {
+    SoftBodySettings settings = sheet(300, 150);
+    settings.motion.compensated = compensated;
+    const Run one = run<TypeParam>(settings, velocity_verlet(), false, 1, 1.0 / 60);
+    const Run two = run<TypeParam>(settings, velocity_verlet(), false, 2, 1.0 / 60);
+    EXPECT_TRUE((one.position == two.position).all());
+  }
 }
 
 // Where rounding shows a body in float is stepped in double: what its float places drop is kept from tick to tick.
 class FineStepper : public testing::Test {
  protected:
-  // Velocities after 0.2 s at a share of the largest stable step.
+  // Velocities after 0.1 s at a share of the largest stable step.
   static Points<double> end(SoftBodySettings settings, double share, softbody::Precision precision, bool compensated) {
     settings.motion.dt = share * softbody::make_soft_body(settings)->stable_step(velocity_verlet());
     settings.precision = precision;
@@ -159,7 +168,7 @@ class FineStepper : public testing::Test {
     settings.motion.watches_energy = false;  // which plain float gains
     World world;
     Body& body = world.add(softbody::make_soft_body(settings));
-    EXPECT_TRUE(world.update(0.2).good());
+    EXPECT_TRUE(world.update(0.1).good());
     return body.velocities();
   }
 

@@ -236,7 +236,7 @@ class Chooser {
     out.precision = precision;
     out.substeps = steps;
     out.evaluations = evaluations_of(method, double(ticks_), double(steps));
-    const bool in_double = rounding_shows(settings_, tick_ / double(steps), speed_, run_.gravity.norm());
+    const bool in_double = rounding_shows(settings_, tick_ / double(steps), speed_, run_.gravity.norm(), limit(method));
     out.seconds = modelled_seconds(settings_, method, precision, out.evaluations, in_double);
     return out;
   }
@@ -399,6 +399,7 @@ class Chooser {
       if (try_coarse_steps()) return;
     }
     for (const double share : {1.0 / 32, 1.0 / 16, 1.0 / 8, 1.0 / 4}) {
+      if (share < 1.0 / 4 && tick_of(share) == tick_of(share / 2)) continue;  // growth would not show
       extend_pair(share);
       const Forecast now = forecast();
       if (kSafety * now.high <= wanted_) return enough(now.high, "less than");
@@ -550,9 +551,10 @@ class Chooser {
     // more than those: then it is worth a look.
     const auto own_order = [&](const Method& method, const Trial& twice, double seen_error, double by_rule,
                                double most) {
-      if (!(kHighSafety * seen_error > std::pow(2.0, by_rule) * wanted_)) return by_rule;
+      const bool wanted = kHighSafety * seen_error > std::pow(2.0, by_rule) * wanted_;
+      if (!wanted || !std::isfinite(seen_error) || by_rule >= most) return by_rule;
       const double next = between(twice, *run(method, 4)) * growth;
-      return next > 0 ? std::clamp(std::log2(seen_error / next), by_rule, most) : by_rule;
+      return next > 0 && std::isfinite(next) ? std::clamp(std::log2(seen_error / next), by_rule, most) : by_rule;
     };
     if (!highest_ || !(kHighSafety * high_error <= wanted_)) {
       const auto better = highest_ ? run(*highest_, 1) : run(*high_, 2);
@@ -599,7 +601,8 @@ class Chooser {
       const bool a_meets = a.predicted_error <= wanted_, b_meets = b.predicted_error <= wanted_;
       if (a_meets != b_meets) return a_meets;
       if (a_meets && a.seconds != b.seconds) return a.seconds < b.seconds;
-      return a.predicted_error < b.predicted_error;
+      if (a.predicted_error != b.predicted_error) return a.predicted_error < b.predicted_error;
+      return a.precision == Precision::Double && b.precision != Precision::Double;
     };
     for (std::size_t i = 1; i < considered_.size(); ++i)
       if (better(considered_[i], considered_[best])) best = i;
@@ -631,7 +634,9 @@ class Chooser {
 
 }  // namespace
 
-bool rounding_shows(const SoftBodySettings& settings, double h, double speed, double gravity) {
+bool rounding_shows(const SoftBodySettings& settings, double h, double speed, double gravity, double stable_step) {
+  if (!settings.motion.compensated) return false;
+  if (std::isfinite(stable_step) && h < PointBody<float>::kFine * stable_step) return true;
   const double size = settings.positions.rows() ? settings.positions.abs().maxCoeff() : 0;
   return PointBody<float>::rounding_shows(h, speed, size, gravity);
 }

@@ -35,7 +35,8 @@ inline constexpr CostTable kProductCost{20, 22};     ///< a product of an implic
 
 /// True where this body, with this RMS speed over points [m/s] and gravity [m/s²], is in float at steps of h stepped
 /// in double (MotionSettings::compensated): that costs what double costs.
-bool rounding_shows(const SoftBodySettings& settings, double h, double speed, double gravity);
+/// @param stable_step the method's largest [s]; 0: not looked at
+bool rounding_shows(const SoftBodySettings& settings, double h, double speed, double gravity, double stable_step = 0);
 
 /// What the table says of `evaluations` of the forces on this body, or sweeps of xpbd().
 /// @param in_double rounding_shows

@@ -449,6 +449,8 @@ class GridStepper final : public Stepper<O> {
  private:
   static constexpr int kBlock = kColumns<S>;
   static constexpr bool kLow = sizeof(O) > sizeof(S), kWide = sizeof(O) < sizeof(S);
+  static constexpr S kRounding =
+      kWide ? S(std::numeric_limits<O>::epsilon()) : std::numeric_limits<S>::epsilon();  // of places
 
   void add_low(const LowParts<O>& low) {
     for (Index r = 0; r < state_.rows && low.position.rows() > 0; ++r)
@@ -527,9 +529,8 @@ class GridStepper final : public Stepper<O> {
       }
       // Where two rows differ by the rounding of positions alone, one serves both: half of that is its share in the
       // stiffness, and nothing at rest, which the squares tell.
-      if (!above.empty() && std::equal(length.begin(), length.end(), above.begin(), [](S a, S b) {
-            return std::abs(a - b) <= S(256) * std::numeric_limits<S>::epsilon() * a;
-          }))
+      if (!above.empty() && std::equal(length.begin(), length.end(), above.begin(),
+                                       [](S a, S b) { return std::abs(a - b) <= S(256) * kRounding * a; }))
         length = above;
       else
         above = length;
