@@ -38,7 +38,7 @@ class Stepper {
   /// Writes positions and velocities back; low parts become what they are too small by, nothing where the stepper
   /// is no more precise than S.
   virtual void store(PointMasses<S>& points, LowParts<S>& low) const = 0;
-  /// float, double or double-float: what the steps are made in.
+  /// float, double or double-float: what the state is kept in from step to step.
   virtual std::string_view precision() const = 0;
 };
 
