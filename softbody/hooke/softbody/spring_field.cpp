@@ -287,23 +287,22 @@ typename ForceField<S>::Rates SpringField<S>::rate_bounds(const Points<S>& x, co
 }
 
 template <class S>
-std::unique_ptr<Stepper<S>> SpringField<S>::any_stepper([[maybe_unused]] bool fine) const {
-  if (damped_) return nullptr;
+std::unique_ptr<Stepper<S>> SpringField<S>::any_stepper(bool fine) const {
+  constexpr bool single = std::is_same_v<S, float>;
+  if (damped_ || (fine && !single)) return nullptr;
 #if HOOKE_HAS_HIGHWAY
   try {
     const SpringGrid grid = SpringGrid::of(*network_, start_.rows());
-    if constexpr (std::is_same_v<S, float>) {
+    if constexpr (single) {
       if (fine) return make_fine_grid_stepper(*network_, grid, start_);
     } else {
-      if (fine) return nullptr;
       if (two_floats_) return make_two_float_grid_stepper(*network_, grid, start_);
     }
     return make_grid_stepper(*network_, grid, start_);
   } catch (const std::invalid_argument&) {
     // Not a grid.
-    if constexpr (std::is_same_v<S, float>)
+    if constexpr (single)
       if (fine) return make_fine_mesh_stepper(*network_, start_);
-    if (fine) return nullptr;
     return two_floats_ ? nullptr : make_mesh_stepper(*network_, start_);
   }
 #else
