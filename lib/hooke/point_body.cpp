@@ -403,7 +403,8 @@ void PointBody<S>::choose_substeps(const Tick& tick) {
     last_estimate_ = tick.start;
     wanted_dt_ = step_share_ * automatic_step();
   }
-  const double count = std::ceil(length / wanted_dt_ - 1e-9);
+  // The length of a tick is rounded as its times are: after days that is more than a billionth of a step.
+  const double count = std::ceil(length / wanted_dt_ * (1 - 1e-9));
   substeps_ = std::clamp<Index>(count < double(settings_.max_substeps) ? Index(count) : settings_.max_substeps, 1,
                                 settings_.max_substeps);
 }
