@@ -420,7 +420,7 @@ void ParticleSystem<S>::plan(const Tick& tick) {
   Plan& p = *plan_;
   p.start = tick.start, p.end = tick.end, p.origin = settings_.origin;
   const double seconds = tick.end - tick.start;
-  p.steps = settings_.dt > 0 ? std::max(1, int(std::ceil(seconds / settings_.dt - 1e-9))) : 1;
+  p.steps = settings_.dt > 0 ? std::max(1, int(std::ceil(seconds / settings_.dt * (1 - 1e-9)))) : 1;
   p.h = seconds / p.steps;
   p.exact = settings_.exact_impacts;
   p.hits = wants_impacts_ || settings_.dies_on_impact;
