@@ -24,16 +24,17 @@ namespace hooke::softbody {
 template <class S>
 constexpr int kColumns = int(64 / sizeof(S));
 
-// Stages whose old rows a band has seen, and those it has finished.
+// Stages whose first two rows a band has stepped, and those it has finished.
 struct alignas(64) GridBand {
   std::atomic<int> ready{0};
   alignas(64) std::atomic<int> done{0};
 };
 
-// What a stage keeps of the rows behind it.
+// What a stage keeps of the rows it has seen.
 template <class S>
 struct GridWake {
-  S* ring;  // four rows: old positions, then force per length of the springs down, diagonal, antidiagonal, down2
+  S* ring;       // force over length of the springs that begin in the last four rows, by direction
+  S* deviation;  // l²/L² - 1 of those of the row at work, in blocks of six directions
 };
 
 template <class S>
@@ -42,28 +43,26 @@ struct GridState {
   std::ptrdiff_t stride;  // from coordinate to coordinate in a row, a block's margin on both sides
   // Positions and velocities are x, y, z; in two floats also what they are more than that.
   bool low;
-  S *x, *motion;              // rows of x|y|z(|low x|y|z); rows of blocks of vx|vy|vz|1/m(|low vx|vy|vz)
+  S* x[2];                    // rows of x|y|z(|low x|y|z): a stage reads one and writes the other
+  S* motion;                  // rows of blocks of vx|vy|vz|1/m(|low vx|vy|vz)
   const S* push;              // null, or rows of blocks of ax|ay|az
   const S* const* stiffness;  // by row: blocks of six directions
-  const S* const* length;     // by row: blocks of rest lengths in six directions, to a few units of their last place
-  const S* const* rest;       // by row: blocks of their exact squares
+  const S* const* rest;       // by row: blocks of the exact squares of their rest lengths
+  const S* const* inverse;    // by row: blocks of one over these, to a few units of their last place
   S gravity[3];
   std::span<const GridWake<S>> wakes;
+  int now;  // which of both holds the positions
 
   // Bands of rows, one a thread; with one band, `together` stages run down the rows at once.
   int bands;
   std::size_t together;
   GridBand* band;
-  S* halo;  // by band: its first two rows as they were before the stage
 
   Index first(int b) const { return rows * b / bands; }
   int planes() const { return low ? 6 : 3; }
   int fields() const { return low ? 7 : 4; }
-  S* edge(int b, int row) const { return halo + (b * 2 + row) * planes() * stride + kColumns<S>; }
-  S* position(Index row) const { return x + row * planes() * stride + kColumns<S>; }
-  S* old(const GridWake<S>& wake, Index row) const {
-    return wake.ring + ((row + 4) & 3) * (planes() + 4) * stride + kColumns<S>;
-  }
+  S* position(int which, Index row) const { return x[which & 1] + row * planes() * stride + kColumns<S>; }
+  S* scales(const GridWake<S>& wake, Index row) const { return wake.ring + (row & 3) * 6 * stride + kColumns<S>; }
 };
 
 }  // namespace hooke::softbody
@@ -77,31 +76,6 @@ using Tag = hn::CappedTag<S, std::size_t(kColumns<S>)>;
 template <class S>
 using V = hn::Vec<Tag<S>>;
 
-// Lane i becomes element i - n of the sequence older, before, now. Only single lanes need the oldest.
-template <int n, class S>
-HWY_INLINE V<S> shifted(V<S> now, V<S> before, [[maybe_unused]] V<S> older) {
-  [[maybe_unused]] const Tag<S> d;
-#if HWY_TARGET == HWY_SCALAR
-  (void)now;
-  return n == 1 ? before : older;
-#elif HWY_TARGET <= HWY_AVX3 && HWY_ARCH_X86
-  if constexpr (sizeof(S) == 4)
-    return V<S>{_mm512_castsi512_ps(
-        _mm512_alignr_epi32(_mm512_castps_si512(now.raw), _mm512_castps_si512(before.raw), 16 - n))};
-  else
-    return V<S>{
-        _mm512_castsi512_pd(_mm512_alignr_epi64(_mm512_castpd_si512(now.raw), _mm512_castpd_si512(before.raw), 8 - n))};
-#else
-  constexpr int kBytes = 16 - n * int(sizeof(S));
-  V<S> middle = before;
-  if constexpr (hn::MaxLanes(d) * sizeof(S) > 16) middle = hn::ConcatLowerUpper(d, now, before);
-  if constexpr (kBytes == 0)
-    return middle;
-  else
-    return hn::CombineShiftRightBytes<kBytes>(d, now, middle);
-#endif
-}
-
 // (high, low) += more, where low stays below half a unit of high's last place (Knuth's two-sum).
 template <class S>
 HWY_INLINE void add_exactly(V<S>& high, V<S>& low, V<S> more) {
@@ -110,219 +84,266 @@ HWY_INLINE void add_exactly(V<S>& high, V<S>& low, V<S> more) {
   high = sum;
 }
 
-// One stage on row r, with the two rows below it; without `stepped`, no more than its springs.
-template <bool pushed, bool stepped, bool low, class S>
-void row(const GridState<S>& grid, const GridWake<S>& wake, Index r, const Stage& stage, const S* x1, const S* x2) {
+template <bool low, class S>
+struct Place {
+  V<S> x, y, z, low_x, low_y, low_z;
+};
+
+template <bool low, class S>
+HWY_INLINE Place<low, S> place(const S* x, std::ptrdiff_t st) {
   const Tag<S> d;
-  constexpr int kLanes = int(hn::MaxLanes(d));
-  constexpr int kBlock = kColumns<S>, kPlanes = low ? 6 : 3, kFields = low ? 7 : 4;
+  Place<low, S> a;
+  a.x = hn::Load(d, x), a.y = hn::Load(d, x + st), a.z = hn::Load(d, x + 2 * st);
+  if constexpr (low)
+    a.low_x = hn::Load(d, x + 3 * st), a.low_y = hn::Load(d, x + 4 * st), a.low_z = hn::Load(d, x + 5 * st);
+  return a;
+}
+
+// From `to` to a: the other way round it costs loads of their own.
+template <bool low, class S>
+HWY_INLINE void difference(const Place<low, S>& a, const S* to, std::ptrdiff_t st, V<S>& x, V<S>& y, V<S>& z) {
+  const Tag<S> d;
+  x = hn::Sub(a.x, hn::LoadU(d, to)), y = hn::Sub(a.y, hn::LoadU(d, to + st));
+  z = hn::Sub(a.z, hn::LoadU(d, to + 2 * st));
+  if constexpr (low) {
+    x = hn::Add(x, hn::Sub(a.low_x, hn::LoadU(d, to + 3 * st)));
+    y = hn::Add(y, hn::Sub(a.low_y, hn::LoadU(d, to + 4 * st)));
+    z = hn::Add(z, hn::Sub(a.low_z, hn::LoadU(d, to + 5 * st)));
+  }
+}
+
+template <class S>
+struct Neighbours {
+  const S* at[kDirections];
+};
+
+template <class S>
+HWY_INLINE Neighbours<S> neighbours(const GridState<S>& grid, Index r, int from) {
+  const S *x0 = grid.position(from, r), *x1 = grid.position(from, r + 1), *x2 = grid.position(from, r + 2);
+  return {{x0 + 1, x0 + 2, x1, x1 + 1, x1 - 1, x2}};
+}
+
+// Force over length of the springs that begin in row r, one by one with care.
+template <bool low, class S>
+HWY_NOINLINE void scale_far(const GridState<S>& grid, Index r, int from, Index c, const S* stiffness, const S* rest,
+                            const S* inverse, S* scale) {
+  const Tag<S> d;
   const std::ptrdiff_t st = grid.stride;
-  [[maybe_unused]] const std::ptrdiff_t st3 = 3 * st;
+  const auto to = neighbours(grid, r, from);
+  for (int lane = 0; lane < kColumns<S>; lane += int(hn::MaxLanes(d))) {
+    const auto a = place<low, S>(grid.position(from, r) + c + lane, st);
+    for (int i = 0; i < kDirections; ++i) {
+      V<S> x, y, z;
+      difference<low, S>(a, to.at[i] + c + lane, st, x, y, z);
+      const int at = i * kColumns<S> + lane;
+      const auto l2 = squared_length(d, x, y, z), more = hn::Sub(l2, hn::Load(d, rest + at)),
+                 k = hn::Load(d, stiffness + at);
+      const auto e = hn::Mul(more, hn::Load(d, inverse + at));
+      const auto far = hn::Gt(hn::Abs(e), hn::Set(d, kNear<S>));
+      S* out = scale + i * st + c + lane;
+      hn::Store(hn::IfThenElse(far, far_from_rest(d, k, more, l2, hn::Load(d, rest + at)), hn::Load(d, out)), d, out);
+    }
+  }
+}
+
+// The same, for the deviations in `wake`. In two loops: processors do not look far enough ahead to work on so many
+// springs at once that their latencies would not show.
+template <bool low, class S>
+void scale_row(const GridState<S>& grid, const GridWake<S>& wake, Index r, int from) {
+  const Tag<S> d;
+  constexpr int kLanes = int(hn::MaxLanes(d)), kBlock = kColumns<S>;
+  const std::ptrdiff_t st = grid.stride;
+  const auto to = neighbours(grid, r, from);
+  const S* x = grid.position(from, r);
+  const S *stiffness = grid.stiffness[r], *rest = grid.rest[r], *inverse = grid.inverse[r];
+  S* HWY_RESTRICT deviation = wake.deviation;
+  S* HWY_RESTRICT scale = grid.scales(wake, r);
+  for (Index block = 0; block < grid.blocks; ++block)
+    for (int lane = 0; lane < kBlock; lane += kLanes) {
+      const Index c = block * kBlock + lane, at = block * 6 * kBlock + lane;
+      const auto a = place<low, S>(x + c, st);
+      for (int i = 0; i < kDirections; ++i) {
+        V<S> dx, dy, dz;
+        difference<low, S>(a, to.at[i] + c, st, dx, dy, dz);
+        const auto more = hn::Sub(squared_length(d, dx, dy, dz), hn::Load(d, rest + at + i * kBlock));
+        hn::Store(hn::Mul(more, hn::Load(d, inverse + at + i * kBlock)), d, deviation + at + i * kBlock);
+      }
+    }
+  for (Index block = 0; block < grid.blocks; ++block) {
+    auto worst = hn::Zero(d);
+    for (int i = 0; i < kDirections; ++i)
+      for (int lane = 0; lane < kBlock; lane += kLanes) {
+        const Index at = (block * 6 + i) * kBlock + lane;
+        const auto e = hn::Load(d, deviation + at);
+        worst = hn::Max(worst, hn::Abs(e));
+        hn::Store(hn::Mul(hn::Mul(hn::Load(d, stiffness + at), e), near_rest(d, e)), d,
+                  scale + i * st + block * kBlock + lane);
+      }
+    if (HWY_UNLIKELY(!hn::AllTrue(d, hn::Le(worst, hn::Set(d, kNear<S>))))) {
+      const Index at = block * 6 * kBlock;
+      scale_far<low, S>(grid, r, from, block * kBlock, stiffness + at, rest + at, inverse + at, scale);
+    }
+  }
+}
+
+// One stage on the points of row r, after the springs that begin in it.
+template <bool pushed, bool low, class S>
+void step_row(const GridState<S>& grid, const GridWake<S>& wake, Index r, const Stage& stage, int from) {
+  const Tag<S> d;
+  constexpr int kLanes = int(hn::MaxLanes(d)), kBlock = kColumns<S>, kFields = low ? 7 : 4;
+  const std::ptrdiff_t st = grid.stride;
   const auto kick = hn::Set(d, S(stage.kick)), drift = hn::Set(d, S(stage.drift));
   const auto gx = hn::Set(d, grid.gravity[0]), gy = hn::Set(d, grid.gravity[1]), gz = hn::Set(d, grid.gravity[2]);
-  S* HWY_RESTRICT x0 = grid.position(r);
-  S* HWY_RESTRICT o0 = grid.old(wake, r);
-  const S *o1 = grid.old(wake, r - 1), *o2 = grid.old(wake, r - 2);
+  const S *s0 = grid.scales(wake, r), *s1 = grid.scales(wake, r - 1), *s2 = grid.scales(wake, r - 2);
+  // No row is above the first: its springs have no force there, whatever the places.
+  const S *x0 = grid.position(from, r), *x1 = grid.position(from, r + 1), *x2 = grid.position(from, r + 2),
+          *u1 = grid.position(from, std::max<Index>(r - 1, 0)), *u2 = grid.position(from, std::max<Index>(r - 2, 0));
+  S* HWY_RESTRICT next = grid.position(from + 1, r);
   S* HWY_RESTRICT motion = grid.motion + r * grid.blocks * kFields * kBlock;
   const S* push = pushed ? grid.push + r * grid.blocks * 3 * kBlock : nullptr;
-  const S *stiffness = grid.stiffness[r], *rest = grid.rest[r], *length = grid.length[r];
-  S* HWY_RESTRICT s0 = o0 + kPlanes * st;
-  const S *s1 = o1 + kPlanes * st, *s2 = o2 + kPlanes * st;
-  // Pulls of the springs to the right, one and two columns long, of the vectors before.
-  auto rx = hn::Zero(d), ry = rx, rz = rx, ux = rx, uy = rx, uz = rx;
-  [[maybe_unused]] auto olderx = rx, oldery = rx, olderz = rx;
   for (Index block = 0; block < grid.blocks; ++block) {
     for (int lane = 0; lane < kBlock; lane += kLanes) {
-      V<S> dx[6], dy[6], dz[6], l[6], s[6];
-      const auto ax = hn::Load(d, x0), ay = hn::Load(d, x0 + st), az = hn::Load(d, x0 + 2 * st);
-      V<S> low_x = ax, low_y = ay, low_z = az;
-      if constexpr (low)
-        low_x = hn::Load(d, x0 + st3), low_y = hn::Load(d, x0 + st3 + st), low_z = hn::Load(d, x0 + st3 + 2 * st);
-      const auto difference = [&](const S* to, V<S>& x, V<S>& y, V<S>& z) HWY_ATTR {
-        x = hn::Sub(hn::LoadU(d, to), ax), y = hn::Sub(hn::LoadU(d, to + st), ay);
-        z = hn::Sub(hn::LoadU(d, to + 2 * st), az);
+      const auto a = place<low, S>(x0, st);
+      // In threes, for one sum of twelve would be waited for.
+      V<S> fx, fy, fz;
+      const auto pull = [&](const S* to, const S* scale) HWY_ATTR {
+        const auto s = hn::LoadU(d, scale);
+        V<S> x, y, z;
+        difference<low, S>(a, to, st, x, y, z);
+        fx = hn::NegMulAdd(s, x, fx), fy = hn::NegMulAdd(s, y, fy), fz = hn::NegMulAdd(s, z, fz);
+      };
+      fx = hn::Zero(d), fy = fx, fz = fx;
+      pull(u2, s2 + kDown2 * st), pull(u1, s1 + kDown * st);
+      pull(u1 - 1, s1 + kDiagonal * st - 1), pull(u1 + 1, s1 + kAntidiagonal * st + 1);
+      auto sx = fx, sy = fy, sz = fz;
+      fx = hn::Zero(d), fy = fx, fz = fx;
+      pull(x0 - 2, s0 + kRight2 * st - 2), pull(x0 - 1, s0 - 1), pull(x0 + 1, s0), pull(x0 + 2, s0 + kRight2 * st);
+      sx = hn::Add(sx, fx), sy = hn::Add(sy, fy), sz = hn::Add(sz, fz);
+      fx = hn::Zero(d), fy = fx, fz = fx;
+      pull(x1 - 1, s0 + kAntidiagonal * st), pull(x1 + 1, s0 + kDiagonal * st), pull(x1, s0 + kDown * st);
+      pull(x2, s0 + kDown2 * st);
+      fx = hn::Add(sx, fx), fy = hn::Add(sy, fy), fz = hn::Add(sz, fz);
+      const auto w = hn::Load(d, motion + 3 * kBlock + lane);
+      const auto free = hn::Ne(w, hn::Zero(d));
+      const auto step = [&](int k, V<S> f, V<S> g, V<S> high, [[maybe_unused]] V<S> x_low) HWY_ATTR {
+        auto more = hn::IfThenElseZero(free, g);
+        if constexpr (pushed) more = hn::Add(more, hn::Load(d, push + k * kBlock + lane));
+        S *v_at = motion + k * kBlock + lane, *to = next + k * st;
+        const auto acceleration = hn::MulAdd(f, w, more);
         if constexpr (low) {
-          const S* low_to = to + st3;
-          x = hn::Add(x, hn::Sub(hn::LoadU(d, low_to), low_x));
-          y = hn::Add(y, hn::Sub(hn::LoadU(d, low_to + st), low_y));
-          z = hn::Add(z, hn::Sub(hn::LoadU(d, low_to + 2 * st), low_z));
+          S* v_low_at = v_at + 4 * kBlock;
+          auto v = hn::Load(d, v_at), v_low = hn::Load(d, v_low_at);
+          add_exactly<S>(v, v_low, hn::Mul(kick, acceleration));
+          add_exactly<S>(high, x_low, hn::MulAdd(drift, v, hn::Mul(drift, v_low)));
+          hn::Store(v, d, v_at), hn::Store(v_low, d, v_low_at);
+          hn::Store(high, d, to), hn::Store(x_low, d, to + 3 * st);
+        } else {
+          const auto v = hn::MulAdd(kick, acceleration, hn::Load(d, v_at));
+          hn::Store(v, d, v_at);
+          hn::Store(hn::MulAdd(drift, v, high), d, to);
         }
       };
-      // Quotients wait for square roots: other work goes between.
-      const auto root = [&](int i, const S* to) HWY_ATTR {
-        difference(to, dx[i], dy[i], dz[i]);
-        const auto l2 = squared_length(d, dx[i], dy[i], dz[i]);
-        const int at = i * kBlock + lane;
-        s[i] = hn::Mul(hn::Load(d, stiffness + at), hn::Sub(l2, hn::Load(d, rest + at)));
-        l[i] = hn::MulAdd(hn::Load(d, length + at), hn::Sqrt(l2), l2);
-      };
-      const auto quotient = [&](int i) HWY_ATTR { s[i] = hn::Div(s[i], l[i]); };
-      auto fx = hn::Zero(d), fy = fx, fz = fx;
-      const auto pull = [&](const S* to, const S* scale) HWY_ATTR {
-        const auto k = hn::LoadU(d, scale);
-        V<S> x, y, z;
-        difference(to, x, y, z);
-        fx = hn::MulAdd(k, x, fx), fy = hn::MulAdd(k, y, fy), fz = hn::MulAdd(k, z, fz);
-      };
-      const auto own = [&](int i, S* keep) HWY_ATTR {
-        hn::Store(s[i], d, keep);
-        fx = hn::MulAdd(s[i], dx[i], fx), fy = hn::MulAdd(s[i], dy[i], fy), fz = hn::MulAdd(s[i], dz[i], fz);
-      };
-      root(kRight, x0 + 1), root(kRight2, x0 + 2), root(kDown, x1);
-      pull(o1, s1);
-      quotient(kRight), quotient(kRight2), quotient(kDown);
-      pull(o1 - 1, s1 + st - 1);
-      const auto px = hn::Mul(s[kRight], dx[kRight]), py = hn::Mul(s[kRight], dy[kRight]),
-                 pz = hn::Mul(s[kRight], dz[kRight]);
-      fx = hn::Add(fx, hn::Sub(px, shifted<1, S>(px, rx, rx)));
-      fy = hn::Add(fy, hn::Sub(py, shifted<1, S>(py, ry, ry)));
-      fz = hn::Add(fz, hn::Sub(pz, shifted<1, S>(pz, rz, rz)));
-      rx = px, ry = py, rz = pz;
-      const auto qx = hn::Mul(s[kRight2], dx[kRight2]), qy = hn::Mul(s[kRight2], dy[kRight2]),
-                 qz = hn::Mul(s[kRight2], dz[kRight2]);
-      fx = hn::Add(fx, hn::Sub(qx, shifted<2, S>(qx, ux, olderx)));
-      fy = hn::Add(fy, hn::Sub(qy, shifted<2, S>(qy, uy, oldery)));
-      fz = hn::Add(fz, hn::Sub(qz, shifted<2, S>(qz, uz, olderz)));
-      if constexpr (kLanes == 1) olderx = ux, oldery = uy, olderz = uz;
-      ux = qx, uy = qy, uz = qz;
-      own(kDown, s0);
-      root(kDiagonal, x1 + 1), root(kAntidiagonal, x1 - 1), root(kDown2, x2);
-      pull(o1 + 1, s1 + 2 * st + 1);
-      quotient(kDiagonal), quotient(kAntidiagonal), quotient(kDown2);
-      pull(o2, s2 + 3 * st);
-      hn::Store(ax, d, o0), hn::Store(ay, d, o0 + st), hn::Store(az, d, o0 + 2 * st);
-      if constexpr (low)
-        hn::Store(low_x, d, o0 + st3), hn::Store(low_y, d, o0 + st3 + st), hn::Store(low_z, d, o0 + st3 + 2 * st);
-      own(kDiagonal, s0 + st), own(kAntidiagonal, s0 + 2 * st), own(kDown2, s0 + 3 * st);
-      if constexpr (stepped) {
-        const auto w = hn::Load(d, motion + 3 * kBlock + lane);
-        const auto free = hn::Ne(w, hn::Zero(d));
-        const auto step = [&](int k, V<S> f, V<S> g, V<S> a) HWY_ATTR {
-          auto more = hn::IfThenElseZero(free, g);
-          if constexpr (pushed) more = hn::Add(more, hn::Load(d, push + k * kBlock + lane));
-          S *v_at = motion + k * kBlock + lane, *x_at = x0 + k * st;
-          const auto acceleration = hn::MulAdd(f, w, more);
-          if constexpr (low) {
-            S *v_low_at = v_at + 4 * kBlock, *x_low_at = x_at + 3 * st;
-            auto v = hn::Load(d, v_at), v_low = hn::Load(d, v_low_at), x_low = hn::Load(d, x_low_at);
-            add_exactly<S>(v, v_low, hn::Mul(kick, acceleration));
-            add_exactly<S>(a, x_low, hn::MulAdd(drift, v, hn::Mul(drift, v_low)));
-            hn::Store(v, d, v_at), hn::Store(v_low, d, v_low_at);
-            hn::Store(a, d, x_at), hn::Store(x_low, d, x_low_at);
-          } else {
-            const auto v = hn::MulAdd(kick, acceleration, hn::Load(d, v_at));
-            hn::Store(v, d, v_at);
-            hn::Store(hn::MulAdd(drift, v, a), d, x_at);
-          }
-        };
-        step(0, fx, gx, ax), step(1, fy, gy, ay), step(2, fz, gz, az);
-      }
-      x0 += kLanes, x1 += kLanes, x2 += kLanes, o0 += kLanes, o1 += kLanes, o2 += kLanes;
+      step(0, fx, gx, a.x, a.low_x), step(1, fy, gy, a.y, a.low_y), step(2, fz, gz, a.z, a.low_z);
+      x0 += kLanes, x1 += kLanes, x2 += kLanes, u1 += kLanes, u2 += kLanes, next += kLanes;
       s0 += kLanes, s1 += kLanes, s2 += kLanes;
     }
-    motion += kFields * kBlock, stiffness += 6 * kBlock, rest += 6 * kBlock, length += 6 * kBlock;
+    motion += kFields * kBlock;
     if constexpr (pushed) push += 3 * kBlock;
   }
 }
 
 template <class S>
-void drift_row(const GridState<S>& grid, Index r, S drift) {
+void drift_row(const GridState<S>& grid, Index r, S drift, int from) {
   const Tag<S> d;
   constexpr int kBlock = kColumns<S>;
   const auto h = hn::Set(d, drift);
   const S* motion = grid.motion + r * grid.blocks * grid.fields() * kBlock;
-  S* x = grid.position(r);
-  for (Index block = 0; block < grid.blocks; ++block, motion += grid.fields() * kBlock, x += kBlock)
+  const S* x = grid.position(from, r);
+  S* next = grid.position(from + 1, r);
+  for (Index block = 0; block < grid.blocks; ++block, motion += grid.fields() * kBlock, x += kBlock, next += kBlock)
     for (int k = 0; k < 3; ++k)
       for (int lane = 0; lane < kBlock; lane += int(hn::MaxLanes(d))) {
         const S* v_at = motion + k * kBlock + lane;
-        S* at = x + k * grid.stride + lane;
+        const std::ptrdiff_t at = k * grid.stride + lane;
         const auto v = hn::Load(d, v_at);
-        auto high = hn::Load(d, at);
+        auto high = hn::Load(d, x + at);
         if (grid.low) {
-          S* low_at = at + 3 * grid.stride;
-          auto low = hn::Load(d, low_at);
+          const std::ptrdiff_t low_at = at + 3 * grid.stride;
+          auto low = hn::Load(d, x + low_at);
           add_exactly<S>(high, low, hn::MulAdd(h, v, hn::Mul(h, hn::Load(d, v_at + 4 * kBlock))));
-          hn::Store(high, d, at), hn::Store(low, d, low_at);
+          hn::Store(high, d, next + at), hn::Store(low, d, next + low_at);
         } else {
-          hn::Store(hn::MulAdd(h, v, high), d, at);
+          hn::Store(hn::MulAdd(h, v, high), d, next + at);
         }
       }
 }
 
-template <bool stepped, class S>
-void row(const GridState<S>& grid, const GridWake<S>& wake, Index r, const Stage& stage, const S* x1, const S* x2) {
-  const bool pushed = stepped && grid.push;
+template <class S>
+void scale_row(const GridState<S>& grid, const GridWake<S>& wake, Index r, int from) {
+  if constexpr (sizeof(S) == 4) {
+    if (grid.low) return scale_row<true, S>(grid, wake, r, from);
+  }
+  scale_row<false, S>(grid, wake, r, from);
+}
+
+// From positions `from` to the others.
+template <class S>
+void row(const GridState<S>& grid, const GridWake<S>& wake, Index r, const Stage& stage, int from) {
+  if (stage.kick == 0) return drift_row(grid, r, S(stage.drift), from);
+  scale_row(grid, wake, r, from);
   if constexpr (sizeof(S) == 4) {
     if (grid.low)
-      return pushed ? row<true, stepped, true>(grid, wake, r, stage, x1, x2)
-                    : row<false, stepped, true>(grid, wake, r, stage, x1, x2);
+      return grid.push ? step_row<true, true, S>(grid, wake, r, stage, from)
+                       : step_row<false, true, S>(grid, wake, r, stage, from);
   }
-  return pushed ? row<true, stepped, false>(grid, wake, r, stage, x1, x2)
-                : row<false, stepped, false>(grid, wake, r, stage, x1, x2);
+  return grid.push ? step_row<true, false, S>(grid, wake, r, stage, from)
+                   : step_row<false, false, S>(grid, wake, r, stage, from);
 }
 
-// Nothing is above the first row.
+// Nothing pulls on the first row from above.
 template <class S>
 void begin_wake(const GridState<S>& grid, const GridWake<S>& wake) {
-  for (Index r = -2; r < 0; ++r) std::fill_n(grid.old(wake, r) - kColumns<S>, (grid.planes() + 4) * grid.stride, S(0));
+  for (Index r = -2; r < 0; ++r) std::fill_n(grid.scales(wake, r) - kColumns<S>, 6 * grid.stride, S(0));
 }
 
-// A stage needs two rows ahead of the one it steps, so the next stage may follow three rows behind.
+// A stage reads two rows ahead of the one it steps, so the next stage may follow three rows behind.
 template <class S>
 void run_together(const GridState<S>& grid, std::span<const Stage> stages) {
-  while (!stages.empty()) {
-    const std::size_t together = std::min(grid.together, stages.size());
+  for (std::size_t done = 0; done < stages.size(); done += grid.together) {
+    const std::size_t together = std::min(grid.together, stages.size() - done);
     for (std::size_t i = 0; i < together; ++i) begin_wake(grid, grid.wakes[i]);
     for (Index front = 0; front < grid.rows + 3 * Index(together - 1); ++front)
       for (std::size_t i = 0; i < together; ++i) {
         const Index r = front - 3 * Index(i);
-        if (r < 0 || r >= grid.rows) continue;
-        if (stages[i].kick == 0)
-          drift_row(grid, r, S(stages[i].drift));
-        else
-          row<true>(grid, grid.wakes[i], r, stages[i], grid.position(r + 1), grid.position(r + 2));
+        if (r >= 0 && r < grid.rows) row(grid, grid.wakes[i], r, stages[done + i], grid.now + int(done + i));
       }
-    stages = stages.subspan(together);
   }
 }
 
 // Rows [first, last) of one band. Springs that cross its upper edge are worked on twice, by both bands, from
-// the same old positions: the same bits as in one pass over all rows. Before the band below steps
-// its first rows it keeps their old positions for us; before we step our last rows it has used them.
+// the same positions: the same bits as in one pass over all rows. A stage writes over the positions that the
+// stage before it read, so neither neighbour may still be there.
 template <class S>
 void run_band(const GridState<S>& grid, std::span<const Stage> stages, int b) {
   const Index first = grid.first(b), last = grid.first(b + 1);
   const bool above = b > 0, below = b + 1 < grid.bands;
   const GridWake<S>& wake = grid.wakes[std::size_t(b)];
   GridBand& own = grid.band[b];
-  if (!above) begin_wake(grid, wake);
-  for (std::size_t i = 0; i < stages.size(); ++i) {
-    const Stage& stage = stages[i];
-    if (stage.kick == 0) {
-      for (Index r = first; r < last; ++r) drift_row(grid, r, S(stage.drift));
-      own.ready.store(int(i) + 1, std::memory_order_release);
-      own.done.store(int(i) + 1, std::memory_order_release);
-      continue;
-    }
+  for (int i = 0; i < int(stages.size()); ++i) {
+    const Stage& stage = stages[std::size_t(i)];
+    const int from = grid.now + i;
     if (above) {
-      wait_for(grid.band[b - 1].done, int(i));
-      for (int k = 0; k < 2; ++k)
-        std::copy_n(grid.position(first + k) - kColumns<S>, grid.planes() * grid.stride, grid.edge(b, k) - kColumns<S>);
-      for (Index r = first - 2; r < first; ++r)
-        row<false>(grid, wake, r, stage, grid.position(r + 1), grid.position(r + 2));
+      wait_for(grid.band[b - 1].done, i);
+      for (Index r = first - 2; r < first && stage.kick != 0; ++r) scale_row(grid, wake, r, from);
     } else {
       begin_wake(grid, wake);
     }
-    own.ready.store(int(i) + 1, std::memory_order_release);
     for (Index r = first; r < last; ++r) {
-      const auto under = [&](Index row) HWY_ATTR {
-        return below && row >= last ? grid.edge(b + 1, int(row - last)) : grid.position(row);
-      };
-      if (below && r == last - 2) wait_for(grid.band[b + 1].ready, int(i) + 1);
-      row<true>(grid, wake, r, stage, under(r + 1), under(r + 2));
+      if (below && r == last - 2) wait_for(grid.band[b + 1].ready, i);
+      row(grid, wake, r, stage, from);
+      if (r == first + 1) own.ready.store(i + 1, std::memory_order_release);
     }
-    own.done.store(int(i) + 1, std::memory_order_release);
+    own.done.store(i + 1, std::memory_order_release);
   }
 }
 
@@ -369,11 +390,12 @@ class GridStepper final : public Stepper<O> {
     state_.rows = grid.rows;
     state_.blocks = (grid.columns + kBlock - 1) / kBlock;
     state_.stride = (state_.blocks + 2) * kBlock;
-    x_.resize(std::size_t((grid.rows + 2) * state_.planes() * state_.stride));
+    const std::ptrdiff_t places = (grid.rows + 2) * state_.planes() * state_.stride;
+    x_.resize(std::size_t(2 * places));
     motion_.resize(std::size_t(grid.rows * state_.blocks * state_.fields() * kBlock));
-    state_.x = x_.data(), state_.motion = motion_.data();
+    state_.x[0] = x_.data(), state_.x[1] = x_.data() + places, state_.motion = motion_.data();
     make_springs(network, grid, start);
-    const std::size_t bytes = sizeof(S) * std::size_t(grid.rows * state_.blocks * kBlock) * 19;
+    const std::size_t bytes = sizeof(S) * std::size_t(grid.rows * state_.blocks * kBlock) * 22;
     state_.together = bytes > kCacheBytes ? kTogether : 1;
     make_wakes(state_.together);
   }
@@ -386,7 +408,7 @@ class GridStepper final : public Stepper<O> {
     for (Index r = 0; r < state_.rows; ++r) {
       for (int k = 0; k < 3; ++k) {
         const O *x = &points.position(r * columns_, k), *v = &points.velocity(r * columns_, k);
-        S* to = state_.position(r) + k * state_.stride;
+        S* to = state_.position(state_.now, r) + k * state_.stride;
         std::transform(x, x + columns_, to, [](O value) { return S(value); });
         to_blocks(v, r, fields, k, state_.motion, [](O value) { return S(value); });
         if (push) to_blocks(&(*push)(r * columns_, k), r, 3, k, push_.data(), [](O value) { return S(value); });
@@ -405,18 +427,17 @@ class GridStepper final : public Stepper<O> {
     state_.bands = gang ? int(std::clamp<Index>(room, 1, gang->size())) : 1;
     if (state_.bands == 1) {
       run_one(stages, 0);
+      state_.now ^= int(stages.size() & 1);
       return;
     }
     if (std::size_t(state_.bands) > wakes_.size()) make_wakes(std::size_t(state_.bands));
-    if (bands_.size() < std::size_t(state_.bands)) {
-      bands_ = std::vector<GridBand>(std::size_t(state_.bands));
-      halo_.resize(std::size_t(state_.bands * 2 * state_.planes() * state_.stride));
-    }
-    state_.band = bands_.data(), state_.halo = halo_.data();
+    if (bands_.size() < std::size_t(state_.bands)) bands_ = std::vector<GridBand>(std::size_t(state_.bands));
+    state_.band = bands_.data();
     for (GridBand& band : bands_) band.ready = 0, band.done = 0;
     gang->run([&](int b) {
       if (b < state_.bands) run_one(stages, b);
     });
+    state_.now ^= int(stages.size() & 1);
   }
 
   void store(PointMasses<O>& points, LowParts<O>& low_parts) const override {
@@ -425,7 +446,7 @@ class GridStepper final : public Stepper<O> {
     for (Index r = 0; r < state_.rows; ++r)
       for (int k = 0; k < 3; ++k) {
         O *x = &points.position(r * columns_, k), *v = &points.velocity(r * columns_, k);
-        const S* from = state_.position(r) + k * state_.stride;
+        const S* from = state_.position(state_.now, r) + k * state_.stride;
         for (Index c = 0; c < columns_; c += kBlock) {
           const Index n = std::min<Index>(kBlock, columns_ - c);
           const S *high = from + c, *low = high + 3 * state_.stride;
@@ -456,7 +477,7 @@ class GridStepper final : public Stepper<O> {
     for (Index r = 0; r < state_.rows && low.position.rows() > 0; ++r)
       for (int k = 0; k < 3; ++k)
         for (Index c = 0; c < columns_; ++c)
-          state_.position(r)[k * state_.stride + c] += low.position(r * columns_ + c, k);
+          state_.position(state_.now, r)[k * state_.stride + c] += low.position(r * columns_ + c, k);
     for (Index r = 0; r < state_.rows && low.velocity.rows() > 0; ++r)
       for (int k = 0; k < 3; ++k)
         for (Index c = 0; c < columns_; ++c)
@@ -472,9 +493,12 @@ class GridStepper final : public Stepper<O> {
 
   void make_wakes(std::size_t n) {
     wakes_.resize(n);
-    const std::ptrdiff_t ring = 4 * (state_.planes() + 4) * state_.stride;
-    rings_.resize(n * std::size_t(ring));
-    for (std::size_t i = 0; i < n; ++i) wakes_[i].ring = rings_.data() + std::ptrdiff_t(i) * ring;
+    const std::ptrdiff_t ring = 4 * 6 * state_.stride, one = ring + 6 * state_.blocks * kBlock;
+    rings_.resize(n * std::size_t(one));
+    for (std::size_t i = 0; i < n; ++i) {
+      wakes_[i].ring = rings_.data() + std::ptrdiff_t(i) * one;
+      wakes_[i].deviation = wakes_[i].ring + ring;
+    }
     state_.wakes = wakes_;
   }
 
@@ -499,10 +523,10 @@ class GridStepper final : public Stepper<O> {
   void make_springs(const SpringNetwork& network, const SpringGrid& grid, const Points<O>& start) {
     const Index width = state_.blocks * kBlock;
     std::vector<S> difference(std::size_t(3 * width)), square(static_cast<std::size_t>(width));
-    std::map<std::vector<S>, std::vector<Index>> stiffness_rows, length_rows, rest_rows;
+    std::map<std::vector<S>, std::vector<Index>> stiffness_rows, rest_rows, inverse_rows;
     std::vector<S> above;
     for (Index r = 0; r < grid.rows; ++r) {
-      std::vector<S> stiffness(std::size_t(6 * width), S(0)), rest(std::size_t(6 * width), S(1)), length = rest;
+      std::vector<S> stiffness(std::size_t(6 * width), S(0)), rest(std::size_t(6 * width), S(1)), inverse = stiffness;
       for (int direction = 0; direction < kDirections; ++direction) {
         std::fill(difference.begin(), difference.end(), S(1));
         for (Index c = 0; c < columns_; ++c) {
@@ -523,20 +547,20 @@ class GridStepper final : public Stepper<O> {
         else
           HWY_DYNAMIC_DISPATCH(squares_double)(width, difference.data(), square.data());
         for (Index c = 0; c < width; ++c) {
-          length[std::size_t(at(0, c, 6, direction))] = std::sqrt(square[std::size_t(c)]);
+          inverse[std::size_t(at(0, c, 6, direction))] = stiffness[std::size_t(at(0, c, 6, direction))] == 0 ? 0 : 1 / square[std::size_t(c)];
           rest[std::size_t(at(0, c, 6, direction))] = square[std::size_t(c)];
         }
       }
       // Where two rows differ by the rounding of positions alone, one serves both: half of that is its share in the
       // stiffness, and nothing at rest, which the squares tell.
-      if (!above.empty() && std::equal(length.begin(), length.end(), above.begin(),
+      if (!above.empty() && std::equal(inverse.begin(), inverse.end(), above.begin(),
                                        [](S a, S b) { return std::abs(a - b) <= S(256) * kRounding * a; }))
-        length = above;
+        inverse = above;
       else
-        above = length;
+        above = inverse;
       stiffness_rows[std::move(stiffness)].push_back(r);
-      length_rows[std::move(length)].push_back(r);
       rest_rows[std::move(rest)].push_back(r);
+      inverse_rows[std::move(inverse)].push_back(r);
     }
     const auto lay = [&](const auto& rows, Lines<S>& memory, std::vector<const S*>& row) {
       row.resize(std::size_t(grid.rows));
@@ -549,15 +573,15 @@ class GridStepper final : public Stepper<O> {
       }
     };
     lay(stiffness_rows, stiffness_, stiffness_row_);
-    lay(length_rows, length_, length_row_);
     lay(rest_rows, rest_, rest_row_);
-    state_.stiffness = stiffness_row_.data(), state_.length = length_row_.data(), state_.rest = rest_row_.data();
+    lay(inverse_rows, inverse_, inverse_row_);
+    state_.stiffness = stiffness_row_.data(), state_.rest = rest_row_.data(), state_.inverse = inverse_row_.data();
   }
 
   Index columns_;
   GridState<S> state_{};
-  Lines<S> x_, motion_, push_, stiffness_, length_, rest_, rings_, halo_;
-  std::vector<const S*> stiffness_row_, length_row_, rest_row_;
+  Lines<S> x_, motion_, push_, stiffness_, rest_, inverse_, rings_;
+  std::vector<const S*> stiffness_row_, rest_row_, inverse_row_;
   std::vector<GridWake<S>> wakes_;
   std::vector<GridBand> bands_;
 };
