@@ -1,5 +1,5 @@
 // Single kernels under Google Benchmark: what a step is made of. Its options are its own, see --help.
-// Arguments of a benchmark: N, then 1 where points and springs are shuffled.
+// Arguments of a benchmark: N, then 1 for a mesh without rows.
 #include "sheet.hpp"
 
 #include <hooke/softbody/spring_field.hpp>
@@ -19,8 +19,8 @@ struct Loaded {
   SpringField<S> springs;
   double count;
 
-  Loaded(int n, bool shuffled)
-      : settings(hanging_sheet(n, shuffled)),
+  Loaded(int n, bool mesh)
+      : settings(hanging_sheet(n, mesh ? Form::Mesh : Form::Grid)),
         springs(settings.network, settings.positions.cast<S>()),
         count(double(settings.network->springs.size())) {
     points.position = settings.positions.cast<S>();

@@ -32,7 +32,7 @@ Points<double> shuffle(const Points<double>& x) {
   return out;
 }
 
-SoftBodySettings hanging_sheet(int n, bool shuffled) {
+SoftBodySettings hanging_sheet(int n, Form form) {
   scene::SceneDescription description = scene::hanging_sheet(n);
   description.bodies[0].solver.precision = Precision::Double;
   const scene::Scene scene = scene::build(description);
@@ -45,12 +45,13 @@ SoftBodySettings hanging_sheet(int n, bool shuffled) {
   out.triangles = sheet.triangles;
   for (std::size_t i = 0; i < sheet.held.size(); ++i)
     if (sheet.held[i]) out.pins.push_back(Index(i));
-  if (!shuffled) return out;
+  if (form == Form::Grid) return out;
 
   const std::vector<int> place = places(out.positions.rows());
   const auto at = [&](auto i) { return place[std::size_t(i)]; };
   SpringNetwork network = *out.network;
   for (Spring& spring : network.springs) spring.a = at(spring.a), spring.b = at(spring.b);
+  if (form == Form::Mesh) network.springs.push_back({at(0), at(std::size_t(out.positions.rows() - 1)), 0});
   std::shuffle(network.springs.begin(), network.springs.end(), std::mt19937(4));
   out.network = std::make_shared<const SpringNetwork>(std::move(network));
   out.positions = shuffle(out.positions);

@@ -11,9 +11,12 @@ namespace hooke::bench {
 using softbody::Precision;
 using softbody::SoftBodySettings;
 
+/// Row by row; points and springs in an order of no meaning; and with a spring of no stiffness across, so that no
+/// rows can be found.
+enum class Form { Grid, Shuffled, Mesh };
+
 /// The standard scene's sheet of n × n points, as settings of a body. Undamped.
-/// @param shuffled points and springs in an order of no meaning: a general mesh
-SoftBodySettings hanging_sheet(int n, bool shuffled = false);
+SoftBodySettings hanging_sheet(int n, Form form = Form::Grid);
 
 /// Points in the order of the shuffled sheet of as many points.
 Points<double> shuffle(const Points<double>& x);

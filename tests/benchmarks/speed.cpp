@@ -112,32 +112,44 @@ double yardstick_error(const PlainSheet& sheet, Precision precision, int steps, 
 // 1. The same steps as the yardstick's.
 Table kernel(const Effort& effort) {
   const int n = 64, steps = int(std::lround(kDuration / yardstick_step(n)));
-  const SoftBodySettings sheet = hanging_sheet(n), mesh = hanging_sheet(n, true);
-  const PlainSheet plain_sheet = plain(sheet), plain_mesh = plain(mesh);
-  const double springs = double(sheet.network->springs.size());
-  const Reference reference = converged(sheet);
-  const Points<double> mesh_reference = shuffle(reference.positions);
+  struct Case {
+    const char* name;
+    SoftBodySettings sheet;
+    PlainSheet plain_sheet;
+    Points<double> answer;
+  };
+  std::vector<Case> cases;
+  const Reference reference = converged(hanging_sheet(n));
+  for (const auto& [form, name] :
+       {std::pair{Form::Grid, "grid"}, {Form::Shuffled, "shuffled grid"}, {Form::Mesh, "mesh"}}) {
+    const SoftBodySettings sheet = hanging_sheet(n, form);
+    cases.push_back(
+        {name, sheet, plain(sheet), form == Form::Grid ? reference.positions : shuffle(reference.positions)});
+  }
   Table table("kernel",
               "Kernel: hanging sheet, 64 × 64, velocity Verlet at the yardstick's steps of 1/2880 s, one thread",
               {"sheet", "precision", "Hooke, ns per spring and step", "error after 0.5 s, m",
                "yardstick, ns per spring and step", "its error, m", "times faster (median of pairs)",
                "times faster (least times)"});
   for (const Precision precision : {Precision::Float, Precision::Double}) {
-    const SoftBodySettings as_grid = moved_by(sheet, velocity_verlet(), precision, yardstick_step(n));
-    const SoftBodySettings as_mesh = moved_by(mesh, velocity_verlet(), precision, yardstick_step(n));
-    std::vector<Contender> turns{ours(as_grid), yardstick(plain_sheet, precision, steps), ours(as_mesh),
-                                 yardstick(plain_mesh, precision, steps)};
+    const auto moved = [&](const Case& c) {
+      return moved_by(c.sheet, velocity_verlet(), precision, yardstick_step(n));
+    };
+    std::vector<Contender> turns;
+    for (const Case& c : cases)
+      turns.push_back(ours(moved(c))), turns.push_back(yardstick(c.plain_sheet, precision, steps));
     take_turns(turns, effort.rounds());
-    for (int form = 0; form < 2; ++form) {
-      const Contender &mine = turns[std::size_t(2 * form)], &other = turns[std::size_t(2 * form + 1)];
+    for (std::size_t i = 0; i < cases.size(); ++i) {
+      const Contender &mine = turns[2 * i], &other = turns[2 * i + 1];
       const Ratio ratio = times_faster(mine, other);
-      const Points<double>& answer = form ? mesh_reference : reference.positions;
-      table.add({form ? "shuffled mesh" : "grid",
+      const Case& c = cases[i];
+      const double springs = double(c.sheet.network->springs.size());
+      table.add({c.name,
                  text_of(precision),
                  {1e9 * mine.least() / springs / steps, "%.2f"},
-                 {rms(run(form ? as_mesh : as_grid).positions, answer), "%.1e"},
+                 {rms(run(moved(c)).positions, c.answer), "%.1e"},
                  {1e9 * other.least() / springs / steps, "%.2f"},
-                 {yardstick_error(form ? plain_mesh : plain_sheet, precision, steps, answer), "%.1e"},
+                 {yardstick_error(c.plain_sheet, precision, steps, c.answer), "%.1e"},
                  {ratio.median, "%.1f"},
                  {ratio.least, "%.1f"}});
     }
@@ -314,16 +326,16 @@ Table threads(const Effort& effort) {
 // 4. What a spring costs in sheets of any size.
 Table size(const Effort& effort) {
   Table table("size", "Size: ns per spring and step, velocity Verlet, one thread",
-              {"N", "points", "springs", "grid, float", "grid, double", "shuffled mesh, float", "shuffled mesh, double",
-               "yardstick, grid, float", "yardstick, shuffled, float"});
+              {"N", "points", "springs", "grid, float", "grid, double", "mesh, float", "mesh, double",
+               "yardstick, grid, float", "yardstick, mesh, float"});
   for (int n = 16; n <= (effort.quick ? 256 : 1024); n *= 2) {
     const double dt = 0.8 * yardstick_step(n);
     const int steps = n <= 128 ? 48 : n <= 512 ? 24 : 12;
     std::vector<std::unique_ptr<Stretch>> stretches;
     std::vector<PlainSheet> plains;
     Index points = 0, springs = 0;
-    for (const bool shuffled : {false, true}) {
-      const SoftBodySettings sheet = hanging_sheet(n, shuffled);
+    for (const Form form : {Form::Grid, Form::Mesh}) {
+      const SoftBodySettings sheet = hanging_sheet(n, form);
       points = sheet.positions.rows(), springs = Index(sheet.network->springs.size());
       for (const Precision precision : {Precision::Float, Precision::Double})
         stretches.push_back(

@@ -1,6 +1,8 @@
 // The fused kernels against the general integrator: the same method, to rounding.
 #include "core/problems.hpp"
 
+#include <hooke/softbody/filtered_grid.hpp>
+#include <hooke/softbody/grid_order.hpp>
 #include <hooke/softbody/soft_body.hpp>
 #include <hooke/world.hpp>
 
@@ -45,6 +47,15 @@ SoftBodySettings sheet(int columns, int rows, bool shuffled = false) {
   for (Index i = 0; i < settings.velocities.rows(); ++i)
     settings.velocities.row(i) << 0.1 * settings.positions(i, 1), 0.3 * settings.positions(i, 0), 0.05;
   for (const Index pin : settings.pins) settings.velocities.row(pin).setZero();
+  return settings;
+}
+
+// The same with a spring of no stiffness across, which leaves no grid to be found.
+SoftBodySettings without_rows(SoftBodySettings settings) {
+  SpringNetwork network = *settings.network;
+  network.springs.push_back({0, int(settings.positions.rows()) - 1, 0});
+  network.springs.push_back({1, int(settings.positions.rows()) / 2, 0});
+  settings.network = std::make_shared<const SpringNetwork>(std::move(network));
   return settings;
 }
 
@@ -122,8 +133,10 @@ TYPED_TEST(Stepper, IsTheGeneralMethodForEverySplitting) {
 }
 
 TYPED_TEST(Stepper, IsTheGeneralMethodOnMeshesInAnyOrder) {
-  expect_same_method<TypeParam>(sheet(17, 12, true), velocity_verlet());
-  expect_same_method<TypeParam>(sheet(33, 20, true), semi_implicit_euler());
+  for (const SoftBodySettings& settings : {sheet(17, 12, true), without_rows(sheet(17, 12, true))})
+    expect_same_method<TypeParam>(settings, velocity_verlet());
+  for (const SoftBodySettings& settings : {sheet(33, 20, true), without_rows(sheet(33, 20, true))})
+    expect_same_method<TypeParam>(settings, semi_implicit_euler());
   expect_same_method<TypeParam>(tangle(70, 400), velocity_verlet());
   expect_same_method<TypeParam>(tangle(9, 20), velocity_verlet());
 }
@@ -186,7 +199,7 @@ class FineStepper : public testing::Test {
 };
 
 TEST_F(FineStepper, KeepsWhatFloatDrops) {
-  for (SoftBodySettings settings : {sheet(17, 12), sheet(17, 12, true)}) {
+  for (SoftBodySettings settings : {sheet(17, 12), sheet(17, 12, true), without_rows(sheet(17, 12, true))}) {
     SpringNetwork stiff = *settings.network;
     for (Spring& spring : stiff.springs) spring.stiffness *= 3e4;
     settings.network = std::make_shared<const SpringNetwork>(std::move(stiff));
@@ -244,12 +257,14 @@ TEST(TwoFloats, SayWhatTheyTake) {
   EXPECT_THROW(softbody::make_soft_body(settings), std::invalid_argument);
   settings = sheet(9, 9, true);
   settings.precision = softbody::Precision::DoubleFloat;
+  EXPECT_NO_THROW(softbody::make_soft_body(settings));
+  settings = without_rows(settings);
   EXPECT_THROW(softbody::make_soft_body(settings), std::invalid_argument);
 }
 
 // Rest is bitwise rest: the kernel's forces at rest lengths are exactly zero.
 TYPED_TEST(Stepper, KeepsRest) {
-  for (SoftBodySettings settings : {sheet(19, 13), sheet(19, 13, true), tangle(50, 200)}) {
+  for (SoftBodySettings settings : {sheet(19, 13), sheet(19, 13, true), without_rows(sheet(19, 13)), tangle(50, 200)}) {
     if (settings.positions.rows() == 50) {
       SpringNetwork network = *settings.network;
       for (Spring& spring : network.springs) spring.rest_length = Spring::kFromStart;
@@ -269,10 +284,49 @@ TYPED_TEST(Stepper, KeepsRest) {
   }
 }
 
+// The kernel of grids finds the rows of a grid in any numbering, and one of its points is where it says.
+TEST(GridOrder, FindsRowsInAnyNumbering) {
+  for (const auto& [columns, rows] : {std::pair{2, 2}, {2, 9}, {5, 3}, {9, 9}, {40, 17}}) {
+    SoftBodySettings settings = sheet(columns, rows, true);
+    // Rolled up by 17 degrees a column, or to three quarters of a turn, narrower downwards.
+    const double turn = std::min(4.7, 0.3 * (columns - 1));
+    for (Index i = 0; i < settings.positions.rows(); ++i) {
+      const double angle = turn * settings.positions(i, 0), r = (1 + 0.2 * settings.positions(i, 1)) / turn;
+      settings.positions.row(i) << r * std::sin(angle), settings.positions(i, 1), r * std::cos(angle);
+    }
+    const std::vector<int> order = softbody::grid_order(*settings.network, settings.positions);
+    ASSERT_EQ(Index(order.size()), settings.positions.rows()) << columns << " × " << rows;
+    std::vector<int> sorted = order;
+    std::sort(sorted.begin(), sorted.end());
+    for (std::size_t i = 0; i < sorted.size(); ++i) EXPECT_EQ(sorted[i], int(i));
+    const SpringNetwork network = softbody::renumbered(*settings.network, order);
+    const softbody::SpringGrid grid = softbody::SpringGrid::of(network, settings.positions.rows());
+    EXPECT_EQ(std::max(grid.rows, grid.columns), std::max(columns, rows));
+    const Points<double> x = softbody::renumbered(settings.positions, order);
+    for (std::size_t i = 0; i < network.springs.size(); ++i) {
+      const Spring &now = network.springs[i], &before = settings.network->springs[i];
+      EXPECT_TRUE((x.row(now.a) == settings.positions.row(before.a)).all());
+      EXPECT_TRUE((x.row(now.b) == settings.positions.row(before.b)).all());
+    }
+  }
+}
+
+TEST(GridOrder, IsEmptyWhereThereAreNoRows) {
+  SoftBodySettings torn = sheet(9, 9, true);
+  SpringNetwork network = *torn.network;
+  std::erase_if(network.springs, [](const Spring& spring) { return spring.a == 40 || spring.b == 40; });
+  for (const SoftBodySettings& settings : {tangle(70, 400), tangle(9, 20), without_rows(sheet(9, 9))})
+    EXPECT_TRUE(softbody::grid_order(*settings.network, settings.positions).empty());
+  EXPECT_TRUE(softbody::grid_order(network, torn.positions).empty());
+  torn.positions.setZero();
+  EXPECT_TRUE(softbody::grid_order(*torn.network, torn.positions).empty());
+  torn.positions.setConstant(std::numeric_limits<double>::quiet_NaN());
+  EXPECT_TRUE(softbody::grid_order(*torn.network, torn.positions).empty());
+}
+
 // Springs that share a place, and springs of no length, pull nowhere and spoil nothing.
 TYPED_TEST(Stepper, SurvivesPointsAtOnePlace) {
-  for (const bool shuffled : {false, true}) {
-    SoftBodySettings settings = sheet(9, 9, shuffled);
+  for (SoftBodySettings settings : {sheet(9, 9), sheet(9, 9, true), without_rows(sheet(9, 9))}) {
     settings.positions.row(40) = settings.positions.row(41);
     const Run fused = run<TypeParam>(settings, velocity_verlet(), false);
     EXPECT_TRUE(fused.position.allFinite());

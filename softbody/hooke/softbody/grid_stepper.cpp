@@ -547,7 +547,8 @@ class GridStepper final : public Stepper<O> {
         else
           HWY_DYNAMIC_DISPATCH(squares_double)(width, difference.data(), square.data());
         for (Index c = 0; c < width; ++c) {
-          inverse[std::size_t(at(0, c, 6, direction))] = stiffness[std::size_t(at(0, c, 6, direction))] == 0 ? 0 : 1 / square[std::size_t(c)];
+          inverse[std::size_t(at(0, c, 6, direction))] =
+              stiffness[std::size_t(at(0, c, 6, direction))] == 0 ? 0 : 1 / square[std::size_t(c)];
           rest[std::size_t(at(0, c, 6, direction))] = square[std::size_t(c)];
         }
       }

@@ -2,6 +2,7 @@
 
 #include <hooke/softbody/kernels.hpp>
 #if HOOKE_HAS_HIGHWAY
+#include <hooke/softbody/grid_order.hpp>
 #include <hooke/softbody/grid_stepper.hpp>
 #include <hooke/softbody/mesh_stepper.hpp>
 #endif
@@ -291,20 +292,29 @@ std::unique_ptr<Stepper<S>> SpringField<S>::any_stepper(bool fine) const {
   constexpr bool single = std::is_same_v<S, float>;
   if (damped_ || (fine && !single)) return nullptr;
 #if HOOKE_HAS_HIGHWAY
-  try {
-    const SpringGrid grid = SpringGrid::of(*network_, start_.rows());
+  const auto of_grid = [&](const SpringNetwork& network, const Points<S>& start) -> std::unique_ptr<Stepper<S>> {
+    const SpringGrid grid = SpringGrid::of(network, start.rows());
     if constexpr (single) {
-      if (fine) return make_fine_grid_stepper(*network_, grid, start_);
+      if (fine) return make_fine_grid_stepper(network, grid, start);
     } else {
-      if (two_floats_) return make_two_float_grid_stepper(*network_, grid, start_);
+      if (two_floats_) return make_two_float_grid_stepper(network, grid, start);
     }
-    return make_grid_stepper(*network_, grid, start_);
+    return make_grid_stepper(network, grid, start);
+  };
+  try {
+    return of_grid(*network_, start_);
   } catch (const std::invalid_argument&) {
-    // Not a grid.
-    if constexpr (single)
-      if (fine) return make_fine_mesh_stepper(*network_, start_);
-    return two_floats_ ? nullptr : make_mesh_stepper(*network_, start_);
+    // Not a grid as it is numbered.
   }
+  try {
+    if (const std::vector<int> order = grid_order(*network_, start_.template cast<double>()); !order.empty())
+      return renumbered(of_grid(renumbered(*network_, order), renumbered(start_, order)), order);
+  } catch (const std::invalid_argument&) {
+    // Two springs between the same points.
+  }
+  if constexpr (single)
+    if (fine) return make_fine_mesh_stepper(*network_, start_);
+  return two_floats_ ? nullptr : make_mesh_stepper(*network_, start_);
 #else
   return nullptr;
 #endif
