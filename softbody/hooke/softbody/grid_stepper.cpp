@@ -24,17 +24,18 @@ namespace hooke::softbody {
 template <class S>
 constexpr int kColumns = int(64 / sizeof(S));
 
-// Stages whose first two rows a band has stepped, and those it has finished.
+// Stages whose old rows a band has seen, and those it has finished.
 struct alignas(64) GridBand {
   std::atomic<int> ready{0};
   alignas(64) std::atomic<int> done{0};
 };
 
-// What a stage keeps of the rows it has seen.
+// What a stage keeps of the rows it has seen: old positions, and force over length of the springs that begin there.
 template <class S>
 struct GridWake {
-  S* ring;       // force over length of the springs that begin in the last four rows, by direction
-  S* deviation;  // l²/L² - 1 of those of the row at work, in blocks of six directions
+  S* near;  // by row, of the last two: five directions
+  S* far;   // by row, of the last four: springs that skip a row
+  S* old;   // by row, of the last four
 };
 
 template <class S>
@@ -43,26 +44,28 @@ struct GridState {
   std::ptrdiff_t stride;  // from coordinate to coordinate in a row, a block's margin on both sides
   // Positions and velocities are x, y, z; in two floats also what they are more than that.
   bool low;
-  S* x[2];                    // rows of x|y|z(|low x|y|z): a stage reads one and writes the other
-  S* motion;                  // rows of blocks of vx|vy|vz|1/m(|low vx|vy|vz)
+  S *x, *motion;              // rows of x|y|z(|low x|y|z); rows of blocks of vx|vy|vz|1/m(|low vx|vy|vz)
   const S* push;              // null, or rows of blocks of ax|ay|az
   const S* const* stiffness;  // by row: blocks of six directions
   const S* const* rest;       // by row: blocks of the exact squares of their rest lengths
   const S* const* inverse;    // by row: blocks of one over these, to a few units of their last place
   S gravity[3];
   std::span<const GridWake<S>> wakes;
-  int now;  // which of both holds the positions
 
   // Bands of rows, one a thread; with one band, `together` stages run down the rows at once.
   int bands;
   std::size_t together;
   GridBand* band;
+  S* halo;  // by band: its first two rows as they were before the stage
 
   Index first(int b) const { return rows * b / bands; }
   int planes() const { return low ? 6 : 3; }
   int fields() const { return low ? 7 : 4; }
-  S* position(int which, Index row) const { return x[which & 1] + row * planes() * stride + kColumns<S>; }
-  S* scales(const GridWake<S>& wake, Index row) const { return wake.ring + (row & 3) * 6 * stride + kColumns<S>; }
+  S* edge(int b, int row) const { return halo + (b * 2 + row) * planes() * stride + kColumns<S>; }
+  S* position(Index row) const { return x + row * planes() * stride + kColumns<S>; }
+  S* old(const GridWake<S>& wake, Index row) const { return wake.old + (row & 3) * planes() * stride + kColumns<S>; }
+  S* near(const GridWake<S>& wake, Index row) const { return wake.near + (row & 1) * 5 * stride + kColumns<S>; }
+  S* far(const GridWake<S>& wake, Index row) const { return wake.far + (row & 3) * stride + kColumns<S>; }
 };
 
 }  // namespace hooke::softbody
@@ -112,93 +115,99 @@ HWY_INLINE void difference(const Place<low, S>& a, const S* to, std::ptrdiff_t s
   }
 }
 
+// The springs that begin in a row by direction: where they lead to, and where their forces over length go.
 template <class S>
-struct Neighbours {
-  const S* at[kDirections];
+struct Row {
+  const S *x, *x1, *x2;  // this row and the two below
+  const S* to[kDirections];
+  S* scale[kDirections];
 };
 
 template <class S>
-HWY_INLINE Neighbours<S> neighbours(const GridState<S>& grid, Index r, int from) {
-  const S *x0 = grid.position(from, r), *x1 = grid.position(from, r + 1), *x2 = grid.position(from, r + 2);
-  return {{x0 + 1, x0 + 2, x1, x1 + 1, x1 - 1, x2}};
+HWY_INLINE Row<S> row_of(const GridState<S>& grid, const GridWake<S>& wake, Index r, const S* x1, const S* x2) {
+  const S* x = grid.position(r);
+  S* near = grid.near(wake, r);
+  const std::ptrdiff_t st = grid.stride;
+  return {x,
+          x1,
+          x2,
+          {x + 1, x + 2, x1, x1 + 1, x1 - 1, x2},
+          {near, near + st, near + 2 * st, near + 3 * st, near + 4 * st, grid.far(wake, r)}};
 }
 
-// Force over length of the springs that begin in row r, one by one with care.
+// Those of a block of columns again, one by one with care.
 template <bool low, class S>
-HWY_NOINLINE void scale_far(const GridState<S>& grid, Index r, int from, Index c, const S* stiffness, const S* rest,
-                            const S* inverse, S* scale) {
+HWY_NOINLINE void scale_far(const GridState<S>& grid, const Row<S>& row, Index r, Index block) {
   const Tag<S> d;
-  const std::ptrdiff_t st = grid.stride;
-  const auto to = neighbours(grid, r, from);
-  for (int lane = 0; lane < kColumns<S>; lane += int(hn::MaxLanes(d))) {
-    const auto a = place<low, S>(grid.position(from, r) + c + lane, st);
+  constexpr int kBlock = kColumns<S>;
+  for (int lane = 0; lane < kBlock; lane += int(hn::MaxLanes(d))) {
+    const Index c = block * kBlock + lane;
+    const auto a = place<low, S>(row.x + c, grid.stride);
     for (int i = 0; i < kDirections; ++i) {
       V<S> x, y, z;
-      difference<low, S>(a, to.at[i] + c + lane, st, x, y, z);
-      const int at = i * kColumns<S> + lane;
-      const auto l2 = squared_length(d, x, y, z), more = hn::Sub(l2, hn::Load(d, rest + at)),
-                 k = hn::Load(d, stiffness + at);
-      const auto e = hn::Mul(more, hn::Load(d, inverse + at));
-      const auto far = hn::Gt(hn::Abs(e), hn::Set(d, kNear<S>));
-      S* out = scale + i * st + c + lane;
-      hn::Store(hn::IfThenElse(far, far_from_rest(d, k, more, l2, hn::Load(d, rest + at)), hn::Load(d, out)), d, out);
+      difference<low, S>(a, row.to[i] + c, grid.stride, x, y, z);
+      const Index at = (block * 6 + i) * kBlock + lane;
+      const auto rest = hn::Load(d, grid.rest[r] + at), k = hn::Load(d, grid.stiffness[r] + at);
+      const auto l2 = squared_length(d, x, y, z), more = hn::Sub(l2, rest);
+      const auto e = hn::Mul(more, hn::Load(d, grid.inverse[r] + at));
+      const auto near = hn::Le(hn::Abs(e), hn::Set(d, kNear<S>));
+      const auto series = hn::Mul(hn::Mul(k, e), near_rest(d, e));
+      hn::Store(hn::IfThenElse(near, series, far_from_rest(d, k, more, l2, rest)), d, row.scale[i] + c);
     }
   }
 }
 
-// The same, for the deviations in `wake`. In two loops: processors do not look far enough ahead to work on so many
-// springs at once that their latencies would not show.
+// Force over length of the springs that begin in row r. In two loops, the deviations l²/L² - 1 first: processors do not
+// look far enough ahead to work on so many springs at once that their latencies would not show.
 template <bool low, class S>
-void scale_row(const GridState<S>& grid, const GridWake<S>& wake, Index r, int from) {
+void scale_row(const GridState<S>& grid, const GridWake<S>& wake, Index r, const Row<S>& row) {
   const Tag<S> d;
   constexpr int kLanes = int(hn::MaxLanes(d)), kBlock = kColumns<S>;
   const std::ptrdiff_t st = grid.stride;
-  const auto to = neighbours(grid, r, from);
-  const S* x = grid.position(from, r);
+  S* HWY_RESTRICT old = grid.old(wake, r);
   const S *stiffness = grid.stiffness[r], *rest = grid.rest[r], *inverse = grid.inverse[r];
-  S* HWY_RESTRICT deviation = wake.deviation;
-  S* HWY_RESTRICT scale = grid.scales(wake, r);
   for (Index block = 0; block < grid.blocks; ++block)
     for (int lane = 0; lane < kBlock; lane += kLanes) {
       const Index c = block * kBlock + lane, at = block * 6 * kBlock + lane;
-      const auto a = place<low, S>(x + c, st);
+      const auto a = place<low, S>(row.x + c, st);
+      hn::Store(a.x, d, old + c), hn::Store(a.y, d, old + st + c), hn::Store(a.z, d, old + 2 * st + c);
+      if constexpr (low) {
+        S* old_low = old + 3 * st + c;
+        hn::Store(a.low_x, d, old_low), hn::Store(a.low_y, d, old_low + st), hn::Store(a.low_z, d, old_low + 2 * st);
+      }
       for (int i = 0; i < kDirections; ++i) {
         V<S> dx, dy, dz;
-        difference<low, S>(a, to.at[i] + c, st, dx, dy, dz);
+        difference<low, S>(a, row.to[i] + c, st, dx, dy, dz);
         const auto more = hn::Sub(squared_length(d, dx, dy, dz), hn::Load(d, rest + at + i * kBlock));
-        hn::Store(hn::Mul(more, hn::Load(d, inverse + at + i * kBlock)), d, deviation + at + i * kBlock);
+        hn::Store(hn::Mul(more, hn::Load(d, inverse + at + i * kBlock)), d, row.scale[i] + c);
       }
     }
   for (Index block = 0; block < grid.blocks; ++block) {
     auto worst = hn::Zero(d);
     for (int i = 0; i < kDirections; ++i)
       for (int lane = 0; lane < kBlock; lane += kLanes) {
-        const Index at = (block * 6 + i) * kBlock + lane;
-        const auto e = hn::Load(d, deviation + at);
+        S* scale = row.scale[i] + block * kBlock + lane;
+        const auto e = hn::Load(d, scale);
         worst = hn::Max(worst, hn::Abs(e));
-        hn::Store(hn::Mul(hn::Mul(hn::Load(d, stiffness + at), e), near_rest(d, e)), d,
-                  scale + i * st + block * kBlock + lane);
+        hn::Store(hn::Mul(hn::Mul(hn::Load(d, stiffness + (block * 6 + i) * kBlock + lane), e), near_rest(d, e)), d,
+                  scale);
       }
-    if (HWY_UNLIKELY(!hn::AllTrue(d, hn::Le(worst, hn::Set(d, kNear<S>))))) {
-      const Index at = block * 6 * kBlock;
-      scale_far<low, S>(grid, r, from, block * kBlock, stiffness + at, rest + at, inverse + at, scale);
-    }
+    if (HWY_UNLIKELY(!hn::AllTrue(d, hn::Le(worst, hn::Set(d, kNear<S>))))) scale_far<low, S>(grid, row, r, block);
   }
 }
 
 // One stage on the points of row r, after the springs that begin in it.
 template <bool pushed, bool low, class S>
-void step_row(const GridState<S>& grid, const GridWake<S>& wake, Index r, const Stage& stage, int from) {
+void step_row(const GridState<S>& grid, const GridWake<S>& wake, Index r, const Stage& stage, const Row<S>& row) {
   const Tag<S> d;
   constexpr int kLanes = int(hn::MaxLanes(d)), kBlock = kColumns<S>, kFields = low ? 7 : 4;
   const std::ptrdiff_t st = grid.stride;
   const auto kick = hn::Set(d, S(stage.kick)), drift = hn::Set(d, S(stage.drift));
   const auto gx = hn::Set(d, grid.gravity[0]), gy = hn::Set(d, grid.gravity[1]), gz = hn::Set(d, grid.gravity[2]);
-  const S *s0 = grid.scales(wake, r), *s1 = grid.scales(wake, r - 1), *s2 = grid.scales(wake, r - 2);
-  // No row is above the first: its springs have no force there, whatever the places.
-  const S *x0 = grid.position(from, r), *x1 = grid.position(from, r + 1), *x2 = grid.position(from, r + 2),
-          *u1 = grid.position(from, std::max<Index>(r - 1, 0)), *u2 = grid.position(from, std::max<Index>(r - 2, 0));
-  S* HWY_RESTRICT next = grid.position(from + 1, r);
+  const S *s0 = grid.near(wake, r), *s1 = grid.near(wake, r - 1), *far = grid.far(wake, r),
+          *far2 = grid.far(wake, r - 2);
+  const S *x0 = grid.old(wake, r), *x1 = row.x1, *x2 = row.x2, *u1 = grid.old(wake, r - 1), *u2 = grid.old(wake, r - 2);
+  S* HWY_RESTRICT next = grid.position(r);
   S* HWY_RESTRICT motion = grid.motion + r * grid.blocks * kFields * kBlock;
   const S* push = pushed ? grid.push + r * grid.blocks * 3 * kBlock : nullptr;
   for (Index block = 0; block < grid.blocks; ++block) {
@@ -213,7 +222,7 @@ void step_row(const GridState<S>& grid, const GridWake<S>& wake, Index r, const 
         fx = hn::NegMulAdd(s, x, fx), fy = hn::NegMulAdd(s, y, fy), fz = hn::NegMulAdd(s, z, fz);
       };
       fx = hn::Zero(d), fy = fx, fz = fx;
-      pull(u2, s2 + kDown2 * st), pull(u1, s1 + kDown * st);
+      pull(u2, far2), pull(u1, s1 + kDown * st);
       pull(u1 - 1, s1 + kDiagonal * st - 1), pull(u1 + 1, s1 + kAntidiagonal * st + 1);
       auto sx = fx, sy = fy, sz = fz;
       fx = hn::Zero(d), fy = fx, fz = fx;
@@ -221,7 +230,7 @@ void step_row(const GridState<S>& grid, const GridWake<S>& wake, Index r, const 
       sx = hn::Add(sx, fx), sy = hn::Add(sy, fy), sz = hn::Add(sz, fz);
       fx = hn::Zero(d), fy = fx, fz = fx;
       pull(x1 - 1, s0 + kAntidiagonal * st), pull(x1 + 1, s0 + kDiagonal * st), pull(x1, s0 + kDown * st);
-      pull(x2, s0 + kDown2 * st);
+      pull(x2, far);
       fx = hn::Add(sx, fx), fy = hn::Add(sy, fy), fz = hn::Add(sz, fz);
       const auto w = hn::Load(d, motion + 3 * kBlock + lane);
       const auto free = hn::Ne(w, hn::Zero(d));
@@ -245,7 +254,7 @@ void step_row(const GridState<S>& grid, const GridWake<S>& wake, Index r, const 
       };
       step(0, fx, gx, a.x, a.low_x), step(1, fy, gy, a.y, a.low_y), step(2, fz, gz, a.z, a.low_z);
       x0 += kLanes, x1 += kLanes, x2 += kLanes, u1 += kLanes, u2 += kLanes, next += kLanes;
-      s0 += kLanes, s1 += kLanes, s2 += kLanes;
+      s0 += kLanes, s1 += kLanes, far += kLanes, far2 += kLanes;
     }
     motion += kFields * kBlock;
     if constexpr (pushed) push += 3 * kBlock;
@@ -253,14 +262,13 @@ void step_row(const GridState<S>& grid, const GridWake<S>& wake, Index r, const 
 }
 
 template <class S>
-void drift_row(const GridState<S>& grid, Index r, S drift, int from) {
+void drift_row(const GridState<S>& grid, Index r, S drift) {
   const Tag<S> d;
   constexpr int kBlock = kColumns<S>;
   const auto h = hn::Set(d, drift);
   const S* motion = grid.motion + r * grid.blocks * grid.fields() * kBlock;
-  const S* x = grid.position(from, r);
-  S* next = grid.position(from + 1, r);
-  for (Index block = 0; block < grid.blocks; ++block, motion += grid.fields() * kBlock, x += kBlock, next += kBlock)
+  S* x = grid.position(r);
+  for (Index block = 0; block < grid.blocks; ++block, motion += grid.fields() * kBlock, x += kBlock)
     for (int k = 0; k < 3; ++k)
       for (int lane = 0; lane < kBlock; lane += int(hn::MaxLanes(d))) {
         const S* v_at = motion + k * kBlock + lane;
@@ -271,79 +279,98 @@ void drift_row(const GridState<S>& grid, Index r, S drift, int from) {
           const std::ptrdiff_t low_at = at + 3 * grid.stride;
           auto low = hn::Load(d, x + low_at);
           add_exactly<S>(high, low, hn::MulAdd(h, v, hn::Mul(h, hn::Load(d, v_at + 4 * kBlock))));
-          hn::Store(high, d, next + at), hn::Store(low, d, next + low_at);
+          hn::Store(high, d, x + at), hn::Store(low, d, x + low_at);
         } else {
-          hn::Store(hn::MulAdd(h, v, high), d, next + at);
+          hn::Store(hn::MulAdd(h, v, high), d, x + at);
         }
       }
 }
 
-template <class S>
-void scale_row(const GridState<S>& grid, const GridWake<S>& wake, Index r, int from) {
-  if constexpr (sizeof(S) == 4) {
-    if (grid.low) return scale_row<true, S>(grid, wake, r, from);
-  }
-  scale_row<false, S>(grid, wake, r, from);
+template <bool low, class S>
+void row(const GridState<S>& grid, const GridWake<S>& wake, Index r, const Stage* stage, const S* x1, const S* x2) {
+  const Row<S> row = row_of(grid, wake, r, x1, x2);
+  scale_row<low, S>(grid, wake, r, row);
+  if (!stage) return;
+  if (grid.push)
+    step_row<true, low, S>(grid, wake, r, *stage, row);
+  else
+    step_row<false, low, S>(grid, wake, r, *stage, row);
 }
 
-// From positions `from` to the others.
+// A stage on row r, with the two below it; without one, no more than its springs.
 template <class S>
-void row(const GridState<S>& grid, const GridWake<S>& wake, Index r, const Stage& stage, int from) {
-  if (stage.kick == 0) return drift_row(grid, r, S(stage.drift), from);
-  scale_row(grid, wake, r, from);
+void row(const GridState<S>& grid, const GridWake<S>& wake, Index r, const Stage* stage, const S* x1, const S* x2) {
   if constexpr (sizeof(S) == 4) {
-    if (grid.low)
-      return grid.push ? step_row<true, true, S>(grid, wake, r, stage, from)
-                       : step_row<false, true, S>(grid, wake, r, stage, from);
+    if (grid.low) return row<true, S>(grid, wake, r, stage, x1, x2);
   }
-  return grid.push ? step_row<true, false, S>(grid, wake, r, stage, from)
-                   : step_row<false, false, S>(grid, wake, r, stage, from);
+  row<false, S>(grid, wake, r, stage, x1, x2);
 }
 
 // Nothing pulls on the first row from above.
 template <class S>
 void begin_wake(const GridState<S>& grid, const GridWake<S>& wake) {
-  for (Index r = -2; r < 0; ++r) std::fill_n(grid.scales(wake, r) - kColumns<S>, 6 * grid.stride, S(0));
+  std::fill_n(grid.near(wake, -1) - kColumns<S>, 5 * grid.stride, S(0));
+  for (Index r = -2; r < 0; ++r) {
+    std::fill_n(grid.far(wake, r) - kColumns<S>, grid.stride, S(0));
+    std::fill_n(grid.old(wake, r) - kColumns<S>, grid.planes() * grid.stride, S(0));
+  }
 }
 
-// A stage reads two rows ahead of the one it steps, so the next stage may follow three rows behind.
+// A stage needs two rows ahead of the one it steps, so the next stage may follow three rows behind.
 template <class S>
 void run_together(const GridState<S>& grid, std::span<const Stage> stages) {
-  for (std::size_t done = 0; done < stages.size(); done += grid.together) {
-    const std::size_t together = std::min(grid.together, stages.size() - done);
+  while (!stages.empty()) {
+    const std::size_t together = std::min(grid.together, stages.size());
     for (std::size_t i = 0; i < together; ++i) begin_wake(grid, grid.wakes[i]);
     for (Index front = 0; front < grid.rows + 3 * Index(together - 1); ++front)
       for (std::size_t i = 0; i < together; ++i) {
         const Index r = front - 3 * Index(i);
-        if (r >= 0 && r < grid.rows) row(grid, grid.wakes[i], r, stages[done + i], grid.now + int(done + i));
+        if (r < 0 || r >= grid.rows) continue;
+        if (stages[i].kick == 0)
+          drift_row(grid, r, S(stages[i].drift));
+        else
+          row(grid, grid.wakes[i], r, &stages[i], grid.position(r + 1), grid.position(r + 2));
       }
+    stages = stages.subspan(together);
   }
 }
 
 // Rows [first, last) of one band. Springs that cross its upper edge are worked on twice, by both bands, from
-// the same positions: the same bits as in one pass over all rows. A stage writes over the positions that the
-// stage before it read, so neither neighbour may still be there.
+// the same old positions: the same bits as in one pass over all rows. Before the band below steps
+// its first rows it keeps their old positions for us; before we step our last rows it has used them.
 template <class S>
 void run_band(const GridState<S>& grid, std::span<const Stage> stages, int b) {
   const Index first = grid.first(b), last = grid.first(b + 1);
   const bool above = b > 0, below = b + 1 < grid.bands;
   const GridWake<S>& wake = grid.wakes[std::size_t(b)];
   GridBand& own = grid.band[b];
-  for (int i = 0; i < int(stages.size()); ++i) {
-    const Stage& stage = stages[std::size_t(i)];
-    const int from = grid.now + i;
+  if (!above) begin_wake(grid, wake);
+  for (std::size_t i = 0; i < stages.size(); ++i) {
+    const Stage& stage = stages[i];
+    if (stage.kick == 0) {
+      for (Index r = first; r < last; ++r) drift_row(grid, r, S(stage.drift));
+      own.ready.store(int(i) + 1, std::memory_order_release);
+      own.done.store(int(i) + 1, std::memory_order_release);
+      continue;
+    }
     if (above) {
-      wait_for(grid.band[b - 1].done, i);
-      for (Index r = first - 2; r < first && stage.kick != 0; ++r) scale_row(grid, wake, r, from);
+      wait_for(grid.band[b - 1].done, int(i));
+      for (int k = 0; k < 2; ++k)
+        std::copy_n(grid.position(first + k) - kColumns<S>, grid.planes() * grid.stride, grid.edge(b, k) - kColumns<S>);
+      for (Index r = first - 2; r < first; ++r)
+        row<S>(grid, wake, r, nullptr, grid.position(r + 1), grid.position(r + 2));
     } else {
       begin_wake(grid, wake);
     }
+    own.ready.store(int(i) + 1, std::memory_order_release);
     for (Index r = first; r < last; ++r) {
-      if (below && r == last - 2) wait_for(grid.band[b + 1].ready, i);
-      row(grid, wake, r, stage, from);
-      if (r == first + 1) own.ready.store(i + 1, std::memory_order_release);
+      const auto under = [&](Index row) HWY_ATTR {
+        return below && row >= last ? grid.edge(b + 1, int(row - last)) : grid.position(row);
+      };
+      if (below && r == last - 2) wait_for(grid.band[b + 1].ready, int(i) + 1);
+      row(grid, wake, r, &stage, under(r + 1), under(r + 2));
     }
-    own.done.store(i + 1, std::memory_order_release);
+    own.done.store(int(i) + 1, std::memory_order_release);
   }
 }
 
@@ -390,12 +417,11 @@ class GridStepper final : public Stepper<O> {
     state_.rows = grid.rows;
     state_.blocks = (grid.columns + kBlock - 1) / kBlock;
     state_.stride = (state_.blocks + 2) * kBlock;
-    const std::ptrdiff_t places = (grid.rows + 2) * state_.planes() * state_.stride;
-    x_.resize(std::size_t(2 * places));
+    x_.resize(std::size_t((grid.rows + 2) * state_.planes() * state_.stride));
     motion_.resize(std::size_t(grid.rows * state_.blocks * state_.fields() * kBlock));
-    state_.x[0] = x_.data(), state_.x[1] = x_.data() + places, state_.motion = motion_.data();
+    state_.x = x_.data(), state_.motion = motion_.data();
     make_springs(network, grid, start);
-    const std::size_t bytes = sizeof(S) * std::size_t(grid.rows * state_.blocks * kBlock) * 22;
+    const std::size_t bytes = sizeof(S) * std::size_t(grid.rows * state_.blocks * kBlock) * 19;
     state_.together = bytes > kCacheBytes ? kTogether : 1;
     make_wakes(state_.together);
   }
@@ -408,7 +434,7 @@ class GridStepper final : public Stepper<O> {
     for (Index r = 0; r < state_.rows; ++r) {
       for (int k = 0; k < 3; ++k) {
         const O *x = &points.position(r * columns_, k), *v = &points.velocity(r * columns_, k);
-        S* to = state_.position(state_.now, r) + k * state_.stride;
+        S* to = state_.position(r) + k * state_.stride;
         std::transform(x, x + columns_, to, [](O value) { return S(value); });
         to_blocks(v, r, fields, k, state_.motion, [](O value) { return S(value); });
         if (push) to_blocks(&(*push)(r * columns_, k), r, 3, k, push_.data(), [](O value) { return S(value); });
@@ -427,17 +453,18 @@ class GridStepper final : public Stepper<O> {
     state_.bands = gang ? int(std::clamp<Index>(room, 1, gang->size())) : 1;
     if (state_.bands == 1) {
       run_one(stages, 0);
-      state_.now ^= int(stages.size() & 1);
       return;
     }
     if (std::size_t(state_.bands) > wakes_.size()) make_wakes(std::size_t(state_.bands));
-    if (bands_.size() < std::size_t(state_.bands)) bands_ = std::vector<GridBand>(std::size_t(state_.bands));
-    state_.band = bands_.data();
+    if (bands_.size() < std::size_t(state_.bands)) {
+      bands_ = std::vector<GridBand>(std::size_t(state_.bands));
+      halo_.resize(std::size_t(state_.bands * 2 * state_.planes() * state_.stride));
+    }
+    state_.band = bands_.data(), state_.halo = halo_.data();
     for (GridBand& band : bands_) band.ready = 0, band.done = 0;
     gang->run([&](int b) {
       if (b < state_.bands) run_one(stages, b);
     });
-    state_.now ^= int(stages.size() & 1);
   }
 
   void store(PointMasses<O>& points, LowParts<O>& low_parts) const override {
@@ -446,7 +473,7 @@ class GridStepper final : public Stepper<O> {
     for (Index r = 0; r < state_.rows; ++r)
       for (int k = 0; k < 3; ++k) {
         O *x = &points.position(r * columns_, k), *v = &points.velocity(r * columns_, k);
-        const S* from = state_.position(state_.now, r) + k * state_.stride;
+        const S* from = state_.position(r) + k * state_.stride;
         for (Index c = 0; c < columns_; c += kBlock) {
           const Index n = std::min<Index>(kBlock, columns_ - c);
           const S *high = from + c, *low = high + 3 * state_.stride;
@@ -477,7 +504,7 @@ class GridStepper final : public Stepper<O> {
     for (Index r = 0; r < state_.rows && low.position.rows() > 0; ++r)
       for (int k = 0; k < 3; ++k)
         for (Index c = 0; c < columns_; ++c)
-          state_.position(state_.now, r)[k * state_.stride + c] += low.position(r * columns_ + c, k);
+          state_.position(r)[k * state_.stride + c] += low.position(r * columns_ + c, k);
     for (Index r = 0; r < state_.rows && low.velocity.rows() > 0; ++r)
       for (int k = 0; k < 3; ++k)
         for (Index c = 0; c < columns_; ++c)
@@ -493,11 +520,13 @@ class GridStepper final : public Stepper<O> {
 
   void make_wakes(std::size_t n) {
     wakes_.resize(n);
-    const std::ptrdiff_t ring = 4 * 6 * state_.stride, one = ring + 6 * state_.blocks * kBlock;
+    const std::ptrdiff_t near = 2 * 5 * state_.stride, far = 4 * state_.stride,
+                         one = near + far + 4 * state_.planes() * state_.stride;
     rings_.resize(n * std::size_t(one));
     for (std::size_t i = 0; i < n; ++i) {
-      wakes_[i].ring = rings_.data() + std::ptrdiff_t(i) * one;
-      wakes_[i].deviation = wakes_[i].ring + ring;
+      wakes_[i].near = rings_.data() + std::ptrdiff_t(i) * one;
+      wakes_[i].far = wakes_[i].near + near;
+      wakes_[i].old = wakes_[i].far + far;
     }
     state_.wakes = wakes_;
   }
@@ -581,7 +610,7 @@ class GridStepper final : public Stepper<O> {
 
   Index columns_;
   GridState<S> state_{};
-  Lines<S> x_, motion_, push_, stiffness_, rest_, inverse_, rings_;
+  Lines<S> x_, motion_, push_, stiffness_, rest_, inverse_, rings_, halo_;
   std::vector<const S*> stiffness_row_, rest_row_, inverse_row_;
   std::vector<GridWake<S>> wakes_;
   std::vector<GridBand> bands_;

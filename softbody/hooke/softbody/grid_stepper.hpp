@@ -13,8 +13,9 @@ namespace hooke::softbody {
 ///
 /// A row's points are stepped in place as soon as the forces on them are complete: every spring is
 /// worked on with the row it starts in, and pulls at the points of later rows from what is kept of the last
-/// two rows. Springs are k (l² - L²) / (l² + l L) d, with L² from the same operations as l²: exactly
-/// nothing at rest. Square roots and quotients are IEEE ones and every operation stays in its lane, so
+/// two rows. With e = l²/L² - 1, a spring's force over length is k (1 - 1/√(1 + e)): a series in e, to a unit of its
+/// last place, where |e| is small, and a root and a quotient for the few that are not. L² comes from the
+/// same operations as l²: exactly nothing at rest. Every operation is an IEEE one and stays in its lane, so
 /// instruction sets with fused multiply-add agree in every bit, and so do those without.
 ///
 /// Where the grid outgrows the caches, several stages follow each other down the rows at once.
