@@ -4,6 +4,7 @@
 #include <hooke/error.hpp>
 #include <hooke/point_body.hpp>
 #include <hooke/softbody/filtered_grid.hpp>
+#include <hooke/softbody/grid_order.hpp>
 #include <hooke/world.hpp>
 
 #include <algorithm>
@@ -87,6 +88,12 @@ bool is_grid(const SoftBodySettings& s) {
   }
 }
 
+// What the fused kernels take for it.
+const CostTable& fused_cost(const SoftBodySettings& s) {
+  if (!s.network) return kNetworkCost;
+  return is_grid(s) || !grid_order(*s.network, s.positions).empty() ? kGridCost : kNetworkCost;
+}
+
 // Whether the fused kernels can run it.
 bool springs_alone(const SoftBodySettings& s) {
   if (s.linear_drag != 0 || s.quadratic_drag != 0 || (s.wind && !s.wind->once_a_tick)) return false;
@@ -95,6 +102,19 @@ bool springs_alone(const SoftBodySettings& s) {
 }
 
 bool is_implicit(const Method& method) { return &method != &xpbd() && std::holds_alternative<Implicit>(method.scheme); }
+
+double seconds_of(const SoftBodySettings& settings, const CostTable& fused_cost, const Method& method,
+                  Precision precision, double evaluations, bool in_double) {
+  const bool fused = springs_alone(settings) && std::holds_alternative<Splitting>(method.scheme);
+  const CostTable& table = &method == &filtered_leapfrog() ? kFilteredCost
+                           : &method == &xpbd()            ? kXpbdCost
+                           : fused                         ? fused_cost
+                                                           : kDampedCost;
+  const double springs = settings.network ? double(settings.network->springs.size()) : 0;
+  const bool stepped = &table == &fused_cost;
+  const bool single = precision == Precision::Float && !(stepped && in_double);
+  return 1e-9 * (single ? table.single : table.twice) * (springs + double(settings.positions.rows())) * evaluations;
+}
 
 void check(const SoftBodySettings& settings, const RunSetting& run) {
   const auto positive = [&](double value, const char* what) {
@@ -176,7 +196,7 @@ struct Forecast {
 class Chooser {
  public:
   Chooser(const SoftBodySettings& settings, const RunSetting& run, double wanted_error)
-      : settings_(settings), run_(run), ticks_(ticks_of(run)) {
+      : settings_(settings), run_(run), ticks_(ticks_of(run)), fused_cost_(fused_cost(settings)) {
     settings_.motion.dt = 0;
     settings_.wanted_error = 0;
     settings_.motion.method = &velocity_verlet();
@@ -237,7 +257,7 @@ class Chooser {
     out.substeps = steps;
     out.evaluations = evaluations_of(method, double(ticks_), double(steps));
     const bool in_double = rounding_shows(settings_, tick_ / double(steps), speed_, run_.gravity.norm(), limit(method));
-    out.seconds = modelled_seconds(settings_, method, precision, out.evaluations, in_double);
+    out.seconds = seconds_of(settings_, fused_cost_, method, precision, out.evaluations, in_double);
     return out;
   }
 
@@ -621,6 +641,7 @@ class Chooser {
   Index ticks_, stride_ = 1;
   double speed_ = 0;  // RMS over points and time [m/s], as far as it is known
   double tick_ = 0, wanted_ = 0;
+  const CostTable& fused_cost_;
   std::vector<Limit> limits_;
   std::optional<ImplicitCost> implicit_cost_;
   const Method *high_ = nullptr, *highest_ = nullptr;  // of order 4 and, where there is one, 6
@@ -643,16 +664,7 @@ bool rounding_shows(const SoftBodySettings& settings, double h, double speed, do
 
 double modelled_seconds(const SoftBodySettings& settings, const Method& method, Precision precision, double evaluations,
                         bool in_double) {
-  const bool fused = springs_alone(settings) && std::holds_alternative<Splitting>(method.scheme);
-  const CostTable& table = &method == &filtered_leapfrog() ? kFilteredCost
-                           : &method == &xpbd()            ? kXpbdCost
-                           : !fused                        ? kDampedCost
-                           : is_grid(settings)             ? kGridCost
-                                                           : kNetworkCost;
-  const double springs = settings.network ? double(settings.network->springs.size()) : 0;
-  const bool stepped = &table == &kGridCost || &table == &kNetworkCost;
-  const bool single = precision == Precision::Float && !(stepped && in_double);
-  return 1e-9 * (single ? table.single : table.twice) * (springs + double(settings.positions.rows())) * evaluations;
+  return seconds_of(settings, fused_cost(settings), method, precision, evaluations, in_double);
 }
 
 ImplicitCost::ImplicitCost(const SoftBodySettings& settings) {

@@ -25,7 +25,7 @@ struct RunSetting {
 struct CostTable {
   double single, twice;  ///< float, double
 };
-inline constexpr CostTable kGridCost{0.75, 1.7};    ///< undamped springs of a grid
+inline constexpr CostTable kGridCost{0.75, 1.7};    ///< undamped springs of a grid, however numbered
 inline constexpr CostTable kNetworkCost{2.4, 3.9};  ///< other undamped springs
 /// The general way: other forces, dampers, other methods.
 inline constexpr CostTable kDampedCost{8, 10};
