@@ -134,7 +134,7 @@ TYPED_TEST(Stepper, IsTheGeneralMethodFarFromRest) {
   for (std::size_t i = 0; i < network.springs.size(); ++i) {
     Spring& spring = network.springs[i];
     const double length = (settings.positions.row(spring.a) - settings.positions.row(spring.b)).matrix().norm();
-    spring.stiffness *= 0.0005;  // slow enough not to be chaotic
+    spring.stiffness *= 0.0001;  // they buckle: slow enough for rounding to stay small
     spring.rest_length = i % 5 ? length * (0.85 + 0.05 * double(i % 7)) : i % 3 ? 0 : 2 * length;
   }
   settings.network = std::make_shared<const SpringNetwork>(std::move(network));
