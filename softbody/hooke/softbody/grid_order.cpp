@@ -144,6 +144,13 @@ class Search {
   std::vector<int> order_;
 };
 
+// Row i of `to` becomes row order[i].
+template <class S>
+void gather(const Points<S>& from, const std::vector<int>& order, Points<S>& to) {
+  to.resize(from.rows(), 3);
+  for (Index i = 0; i < from.rows(); ++i) to.row(i) = from.row(order[std::size_t(i)]);
+}
+
 template <class S>
 class RenumberedStepper final : public Stepper<S> {
  public:
@@ -151,11 +158,11 @@ class RenumberedStepper final : public Stepper<S> {
       : inner_(std::move(inner)), order_(std::move(order)) {}
 
   void load(const PointMasses<S>& points, const LowParts<S>& low, const Vec3& gravity, const Points<S>* push) override {
-    gather(points.position, points_.position), gather(points.velocity, points_.velocity);
+    gather(points.position, order_, points_.position), gather(points.velocity, order_, points_.velocity);
     points_.inverse_mass.resize(points.size());
     for (std::size_t i = 0; i < order_.size(); ++i) points_.inverse_mass[Index(i)] = points.inverse_mass[order_[i]];
-    gather(low.position, low_.position), gather(low.velocity, low_.velocity);
-    if (push) gather(*push, push_);
+    gather(low.position, order_, low_.position), gather(low.velocity, order_, low_.velocity);
+    if (push) gather(*push, order_, push_);
     inner_->load(points_, low_, gravity, push ? &push_ : nullptr);
   }
   void run(std::span<const Stage> stages, Gang* gang) override { inner_->run(stages, gang); }
@@ -167,10 +174,6 @@ class RenumberedStepper final : public Stepper<S> {
   std::string_view precision() const override { return inner_->precision(); }
 
  private:
-  void gather(const Points<S>& from, Points<S>& to) const {
-    to.resize(from.rows(), 3);
-    for (Index i = 0; i < from.rows(); ++i) to.row(i) = from.row(order_[std::size_t(i)]);
-  }
   void scatter(const Points<S>& from, Points<S>& to) const {
     to.resize(from.rows(), 3);
     for (Index i = 0; i < from.rows(); ++i) to.row(order_[std::size_t(i)]) = from.row(i);
@@ -199,8 +202,8 @@ SpringNetwork renumbered(const SpringNetwork& network, const std::vector<int>& o
 
 template <class S>
 Points<S> renumbered(const Points<S>& values, const std::vector<int>& order) {
-  Points<S> out(values.rows(), 3);
-  for (Index i = 0; i < out.rows(); ++i) out.row(i) = values.row(order[std::size_t(i)]);
+  Points<S> out;
+  gather(values, order, out);
   return out;
 }
 

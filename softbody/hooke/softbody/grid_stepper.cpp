@@ -118,7 +118,7 @@ HWY_INLINE void difference(const Place<low, S>& a, const S* to, std::ptrdiff_t s
 // The springs that begin in a row by direction: where they lead to, and where their forces over length go.
 template <class S>
 struct Row {
-  const S *x, *x1, *x2;  // this row and the two below
+  const S* x;
   const S* to[kDirections];
   S* scale[kDirections];
 };
@@ -129,13 +129,11 @@ HWY_INLINE Row<S> row_of(const GridState<S>& grid, const GridWake<S>& wake, Inde
   S* near = grid.near(wake, r);
   const std::ptrdiff_t st = grid.stride;
   return {x,
-          x1,
-          x2,
           {x + 1, x + 2, x1, x1 + 1, x1 - 1, x2},
           {near, near + st, near + 2 * st, near + 3 * st, near + 4 * st, grid.far(wake, r)}};
 }
 
-// Those of a block of columns again, one by one with care.
+// Puts right those of a block of columns that the series does not hold for.
 template <bool low, class S>
 HWY_NOINLINE void scale_far(const GridState<S>& grid, const Row<S>& row, Index r, Index block) {
   const Tag<S> d;
@@ -147,12 +145,12 @@ HWY_NOINLINE void scale_far(const GridState<S>& grid, const Row<S>& row, Index r
       V<S> x, y, z;
       difference<low, S>(a, row.to[i] + c, grid.stride, x, y, z);
       const Index at = (block * 6 + i) * kBlock + lane;
-      const auto rest = hn::Load(d, grid.rest[r] + at), k = hn::Load(d, grid.stiffness[r] + at);
-      const auto l2 = squared_length(d, x, y, z), more = hn::Sub(l2, rest);
+      const auto rest = hn::Load(d, grid.rest[r] + at), l2 = squared_length(d, x, y, z), more = hn::Sub(l2, rest);
       const auto e = hn::Mul(more, hn::Load(d, grid.inverse[r] + at));
       const auto near = hn::Le(hn::Abs(e), hn::Set(d, kNear<S>));
-      const auto series = hn::Mul(hn::Mul(k, e), near_rest(d, e));
-      hn::Store(hn::IfThenElse(near, series, far_from_rest(d, k, more, l2, rest)), d, row.scale[i] + c);
+      const auto exact = far_from_rest(d, hn::Load(d, grid.stiffness[r] + at), more, l2, rest);
+      S* scale = row.scale[i] + c;
+      hn::Store(hn::IfThenElse(near, hn::Load(d, scale), exact), d, scale);
     }
   }
 }
@@ -206,14 +204,15 @@ void step_row(const GridState<S>& grid, const GridWake<S>& wake, Index r, const 
   const auto gx = hn::Set(d, grid.gravity[0]), gy = hn::Set(d, grid.gravity[1]), gz = hn::Set(d, grid.gravity[2]);
   const S *s0 = grid.near(wake, r), *s1 = grid.near(wake, r - 1), *far = grid.far(wake, r),
           *far2 = grid.far(wake, r - 2);
-  const S *x0 = grid.old(wake, r), *x1 = row.x1, *x2 = row.x2, *u1 = grid.old(wake, r - 1), *u2 = grid.old(wake, r - 2);
+  const S *x0 = grid.old(wake, r), *x1 = row.to[kDown], *x2 = row.to[kDown2], *u1 = grid.old(wake, r - 1),
+          *u2 = grid.old(wake, r - 2);
   S* HWY_RESTRICT next = grid.position(r);
   S* HWY_RESTRICT motion = grid.motion + r * grid.blocks * kFields * kBlock;
   const S* push = pushed ? grid.push + r * grid.blocks * 3 * kBlock : nullptr;
   for (Index block = 0; block < grid.blocks; ++block) {
     for (int lane = 0; lane < kBlock; lane += kLanes) {
       const auto a = place<low, S>(x0, st);
-      // In threes, for one sum of twelve would be waited for.
+      // Three sums that do not wait for each other: from above, along the row, from below.
       V<S> fx, fy, fz;
       const auto pull = [&](const S* to, const S* scale) HWY_ATTR {
         const auto s = hn::LoadU(d, scale);
@@ -344,7 +343,6 @@ void run_band(const GridState<S>& grid, std::span<const Stage> stages, int b) {
   const bool above = b > 0, below = b + 1 < grid.bands;
   const GridWake<S>& wake = grid.wakes[std::size_t(b)];
   GridBand& own = grid.band[b];
-  if (!above) begin_wake(grid, wake);
   for (std::size_t i = 0; i < stages.size(); ++i) {
     const Stage& stage = stages[i];
     if (stage.kick == 0) {
