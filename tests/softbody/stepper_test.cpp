@@ -9,6 +9,10 @@
 #include <numeric>
 #include <random>
 
+#ifdef HOOKE_TEST_HAS_HIGHWAY
+#include <hwy/targets.h>
+#endif
+
 namespace hooke::test {
 namespace {
 
@@ -183,6 +187,60 @@ TYPED_TEST(Stepper, HasTheSameBitsWhereStagesFollowEachOther) {
     EXPECT_TRUE((one.position == two.position).all());
   }
 }
+
+#ifdef HOOKE_TEST_HAS_HIGHWAY
+// Instruction sets with multiply-add agree in every bit, and so do those without: springs near their rest lengths and
+// far from them, in every precision.
+TEST(InstructionSets, AgreeInEveryBitWithTheirKind) {
+  std::vector<SoftBodySettings> bodies{sheet(37, 20), sheet(37, 20, true), without_rows(sheet(17, 12, true))};
+  SpringNetwork odd = *bodies[0].network;
+  for (std::size_t i = 0; i < odd.springs.size(); i += 7) odd.springs[i].rest_length = i % 2 ? 0 : 0.1;
+  bodies.push_back(bodies[0]);
+  bodies.back().network = std::make_shared<const SpringNetwork>(std::move(odd));
+  using softbody::Precision;
+  const auto ends = [&](std::int64_t target) {
+    hwy::SetSupportedTargetsForTest(target);
+    std::vector<Points<double>> out;
+    for (std::size_t i = 0; i < bodies.size(); ++i)
+      for (const Precision precision : {Precision::Float, Precision::Double, Precision::DoubleFloat}) {
+        if (i == 2 && precision == Precision::DoubleFloat) continue;  // grids only
+        SoftBodySettings settings = bodies[i];
+        settings.precision = precision;
+        World world;
+        Body& body = world.add(softbody::make_soft_body(settings));
+        EXPECT_TRUE(world.update(0.05).good());
+        out.push_back(body.positions());
+        out.push_back(body.velocities());
+      }
+    hwy::SetSupportedTargetsForTest(0);
+    return out;
+  };
+  const std::int64_t all = hwy::SupportedTargets() & HWY_TARGETS;  // that kernels are compiled for
+  constexpr std::int64_t kWithout = HWY_SSE4 | HWY_SSSE3;
+  std::vector<std::vector<Points<double>>> kinds;
+  int compared = 0;
+  for (const std::int64_t kind : {~kWithout, kWithout}) {
+    std::vector<Points<double>> first;
+    for (std::int64_t rest = all & kind & (HWY_AVX3 | HWY_AVX2 | kWithout); rest != 0; rest &= rest - 1) {
+      const std::int64_t target = rest & -rest;
+      auto end = ends(target);
+      if (first.empty()) {
+        first = std::move(end);
+        continue;
+      }
+      ++compared;
+      for (std::size_t i = 0; i < end.size(); ++i)
+        EXPECT_TRUE((end[i] == first[i]).all()) << "result " << i << " with " << hwy::TargetName(target);
+    }
+    if (!first.empty()) kinds.push_back(std::move(first));
+  }
+  if (compared == 0) GTEST_SKIP() << "one instruction set of a kind here";
+  // They are really switched: with multiply-add and without, results differ by rounding.
+  if (kinds.size() == 2) {
+    EXPECT_FALSE((kinds[0][0] == kinds[1][0]).all());
+  }
+}
+#endif
 
 // Where rounding shows a body in float is stepped in double: what its float places drop is kept from tick to tick.
 class FineStepper : public testing::Test {

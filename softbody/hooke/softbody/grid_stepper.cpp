@@ -30,12 +30,11 @@ struct alignas(64) GridBand {
   alignas(64) std::atomic<int> done{0};
 };
 
-// What a stage keeps of the rows it has seen: old positions, and force over length of the springs that begin there.
+// What the springs that a stage has seen pull at, summed up: the row after the last one, and the one behind that.
+// Rows of x|y|z, with the sign of the springs' upper ends.
 template <class S>
 struct GridWake {
-  S* near;  // by row, of the last two: five directions
-  S* far;   // by row, of the last four: springs that skip a row
-  S* old;   // by row, of the last four
+  S *next, *next2;
 };
 
 template <class S>
@@ -63,9 +62,6 @@ struct GridState {
   int fields() const { return low ? 7 : 4; }
   S* edge(int b, int row) const { return halo + (b * 2 + row) * planes() * stride + kColumns<S>; }
   S* position(Index row) const { return x + row * planes() * stride + kColumns<S>; }
-  S* old(const GridWake<S>& wake, Index row) const { return wake.old + (row & 3) * planes() * stride + kColumns<S>; }
-  S* near(const GridWake<S>& wake, Index row) const { return wake.near + (row & 1) * 5 * stride + kColumns<S>; }
-  S* far(const GridWake<S>& wake, Index row) const { return wake.far + (row & 3) * stride + kColumns<S>; }
 };
 
 }  // namespace hooke::softbody
@@ -96,165 +92,206 @@ template <bool low, class S>
 HWY_INLINE Place<low, S> place(const S* x, std::ptrdiff_t st) {
   const Tag<S> d;
   Place<low, S> a;
-  a.x = hn::Load(d, x), a.y = hn::Load(d, x + st), a.z = hn::Load(d, x + 2 * st);
+  a.x = hn::LoadU(d, x), a.y = hn::LoadU(d, x + st), a.z = hn::LoadU(d, x + 2 * st);
   if constexpr (low)
-    a.low_x = hn::Load(d, x + 3 * st), a.low_y = hn::Load(d, x + 4 * st), a.low_z = hn::Load(d, x + 5 * st);
+    a.low_x = hn::LoadU(d, x + 3 * st), a.low_y = hn::LoadU(d, x + 4 * st), a.low_z = hn::LoadU(d, x + 5 * st);
   return a;
 }
 
-// From `to` to a: the other way round it costs loads of their own.
+template <class S>
+struct Way {
+  V<S> x, y, z;
+};
+
 template <bool low, class S>
-HWY_INLINE void difference(const Place<low, S>& a, const S* to, std::ptrdiff_t st, V<S>& x, V<S>& y, V<S>& z) {
-  const Tag<S> d;
-  x = hn::Sub(a.x, hn::LoadU(d, to)), y = hn::Sub(a.y, hn::LoadU(d, to + st));
-  z = hn::Sub(a.z, hn::LoadU(d, to + 2 * st));
+HWY_INLINE Way<S> way(const Place<low, S>& from, const Place<low, S>& to) {
+  Way<S> w{hn::Sub(to.x, from.x), hn::Sub(to.y, from.y), hn::Sub(to.z, from.z)};
   if constexpr (low) {
-    x = hn::Add(x, hn::Sub(a.low_x, hn::LoadU(d, to + 3 * st)));
-    y = hn::Add(y, hn::Sub(a.low_y, hn::LoadU(d, to + 4 * st)));
-    z = hn::Add(z, hn::Sub(a.low_z, hn::LoadU(d, to + 5 * st)));
+    w.x = hn::Add(w.x, hn::Sub(to.low_x, from.low_x)), w.y = hn::Add(w.y, hn::Sub(to.low_y, from.low_y));
+    w.z = hn::Add(w.z, hn::Sub(to.low_z, from.low_z));
+  }
+  return w;
+}
+
+// The ways of the springs that begin at the columns of a vector, by direction. An antidiagonal one begins a column
+// further.
+template <bool low, class S>
+HWY_INLINE void ways(const Place<low, S>& a, const S* x0, const S* x1, const S* x2, std::ptrdiff_t st, Way<S>* out) {
+  const auto right = place<low, S>(x0 + 1, st), down = place<low, S>(x1, st);
+  out[kRight] = way(a, right);
+  out[kRight2] = way(a, place<low, S>(x0 + 2, st));
+  out[kDown] = way(a, down);
+  out[kDiagonal] = way(a, place<low, S>(x1 + 1, st));
+  out[kAntidiagonal] = way(right, down);
+  out[kDown2] = way(a, place<low, S>(x2, st));
+}
+
+// Parameters of the springs that begin at the columns of a vector; those of a direction are a block apart.
+template <class S>
+struct Springs {
+  const S *stiffness, *rest, *inverse;
+
+  HWY_INLINE void go_on(int by) { stiffness += by, rest += by, inverse += by; }
+};
+
+// Forces over length by root and quotient where the series does not hold. From memory: ways that somebody else may look
+// at would not stay in registers.
+template <bool low, class S>
+HWY_NOINLINE void scale_far(const S* x0, const S* x1, const S* x2, std::ptrdiff_t st, Springs<S> springs, S* scale) {
+  const Tag<S> d;
+  Way<S> w[kDirections];
+  ways<low, S>(place<low, S>(x0, st), x0, x1, x2, st, w);
+  for (int i = 0; i < kDirections; ++i) {
+    const int at = i * kColumns<S>;
+    const auto rest = hn::Load(d, springs.rest + at), l2 = squared_length(d, w[i].x, w[i].y, w[i].z);
+    const auto more = hn::Sub(l2, rest), e = hn::Mul(more, hn::Load(d, springs.inverse + at));
+    const auto exact = far_from_rest(d, hn::Load(d, springs.stiffness + at), more, l2, rest);
+    S* to = scale + i * int(hn::MaxLanes(d));
+    hn::Store(hn::IfThenElse(hn::Le(hn::Abs(e), hn::Set(d, kNear<S>)), hn::Load(d, to), exact), d, to);
   }
 }
 
-// The springs that begin in a row by direction: where they lead to, and where their forces over length go.
+// Forces over length of the springs with these ways. All directions take the same step at once: a processor looks some
+// hundred operations ahead, and would find too little to do if one spring came after the other.
+template <bool low, class S>
+HWY_INLINE void scale_springs(const S* x0, const S* x1, const S* x2, std::ptrdiff_t st, const Springs<S>& springs,
+                              const Way<S> (&w)[kDirections], V<S> (&scale)[kDirections]) {
+  const Tag<S> d;
+  constexpr int kLanes = int(hn::MaxLanes(d)), kBlock = kColumns<S>;
+  V<S> e[kDirections];
+  for (int i = 0; i < kDirections; ++i) e[i] = hn::MulAdd(w[i].x, w[i].x, hn::Set(d, S(kTiny)));
+  for (int i = 0; i < kDirections; ++i) e[i] = hn::MulAdd(w[i].y, w[i].y, e[i]);
+  for (int i = 0; i < kDirections; ++i) e[i] = hn::MulAdd(w[i].z, w[i].z, e[i]);
+  for (int i = 0; i < kDirections; ++i) e[i] = hn::Sub(e[i], hn::Load(d, springs.rest + i * kBlock));
+  for (int i = 0; i < kDirections; ++i) e[i] = hn::Mul(e[i], hn::Load(d, springs.inverse + i * kBlock));
+  near_rest(d, e, springs.stiffness, kBlock, scale);
+  auto worst = hn::Zero(d);
+  for (int i = 0; i < kDirections; ++i) worst = larger_size<S>(worst, e[i]);
+  if (HWY_UNLIKELY(!hn::AllTrue(d, hn::Le(worst, hn::Set(d, kNear<S>))))) {
+    alignas(64) S some[kDirections * kLanes];
+    for (int i = 0; i < kDirections; ++i) hn::Store(scale[i], d, some + i * kLanes);
+    scale_far<low, S>(x0, x1, x2, st, springs, some);
+    for (int i = 0; i < kDirections; ++i) scale[i] = hn::Load(d, some + i * kLanes);
+  }
+}
+
 template <class S>
-struct Row {
-  const S* x;
-  const S* to[kDirections];
-  S* scale[kDirections];
+HWY_INLINE void add_to(Way<S>& sum, V<S> scale, const Way<S>& w) {
+  sum.x = hn::MulAdd(scale, w.x, sum.x), sum.y = hn::MulAdd(scale, w.y, sum.y), sum.z = hn::MulAdd(scale, w.z, sum.z);
+}
+
+template <class S>
+HWY_INLINE Way<S> times(V<S> scale, const Way<S>& w) {
+  return {hn::Mul(scale, w.x), hn::Mul(scale, w.y), hn::Mul(scale, w.z)};
+}
+
+// What pulls at points n columns further on, on its way there from vector to vector.
+template <int n, class S>
+struct Carry {
+  static constexpr int kVectors = n > int(hn::MaxLanes(Tag<S>())) ? n : 1;
+  Way<S> before[kVectors];
+
+  HWY_INLINE Carry() {
+    const auto nothing = hn::Zero(Tag<S>());
+    for (Way<S>& w : before) w = {nothing, nothing, nothing};
+  }
+  HWY_INLINE Way<S> pass(const Way<S>& now) {
+    Way<S> out = before[0];
+    if constexpr (n < int(hn::MaxLanes(Tag<S>())))
+      out = {lanes_up<n, S>(out.x, now.x), lanes_up<n, S>(out.y, now.y), lanes_up<n, S>(out.z, now.z)};
+    for (int i = 0; i + 1 < kVectors; ++i) before[i] = before[i + 1];
+    before[kVectors - 1] = now;
+    return out;
+  }
 };
 
 template <class S>
-HWY_INLINE Row<S> row_of(const GridState<S>& grid, const GridWake<S>& wake, Index r, const S* x1, const S* x2) {
-  const S* x = grid.position(r);
-  S* near = grid.near(wake, r);
-  const std::ptrdiff_t st = grid.stride;
-  return {x,
-          {x + 1, x + 2, x1, x1 + 1, x1 - 1, x2},
-          {near, near + st, near + 2 * st, near + 3 * st, near + 4 * st, grid.far(wake, r)}};
+HWY_INLINE Way<S> load_way(const S* from, std::ptrdiff_t st) {
+  const Tag<S> d;
+  return {hn::Load(d, from), hn::Load(d, from + st), hn::Load(d, from + 2 * st)};
 }
 
-// Puts right those of a block of columns that the series does not hold for.
-template <bool low, class S>
-HWY_NOINLINE void scale_far(const GridState<S>& grid, const Row<S>& row, Index r, Index block) {
+template <class S>
+HWY_INLINE void store_way(const Way<S>& w, S* to, std::ptrdiff_t st) {
+  const Tag<S> d;
+  hn::Store(w.x, d, to), hn::Store(w.y, d, to + st), hn::Store(w.z, d, to + 2 * st);
+}
+
+// One stage on the points of a vector.
+template <bool pushed, bool low, class S>
+HWY_INLINE void step(const Way<S>& force, const Place<low, S>& a, S kick_time, S drift_time, const S* gravity,
+                     S* motion, const S* push, S* next, std::ptrdiff_t st) {
   const Tag<S> d;
   constexpr int kBlock = kColumns<S>;
-  for (int lane = 0; lane < kBlock; lane += int(hn::MaxLanes(d))) {
-    const Index c = block * kBlock + lane;
-    const auto a = place<low, S>(row.x + c, grid.stride);
-    for (int i = 0; i < kDirections; ++i) {
-      V<S> x, y, z;
-      difference<low, S>(a, row.to[i] + c, grid.stride, x, y, z);
-      const Index at = (block * 6 + i) * kBlock + lane;
-      const auto rest = hn::Load(d, grid.rest[r] + at), l2 = squared_length(d, x, y, z), more = hn::Sub(l2, rest);
-      const auto e = hn::Mul(more, hn::Load(d, grid.inverse[r] + at));
-      const auto near = hn::Le(hn::Abs(e), hn::Set(d, kNear<S>));
-      const auto exact = far_from_rest(d, hn::Load(d, grid.stiffness[r] + at), more, l2, rest);
-      S* scale = row.scale[i] + c;
-      hn::Store(hn::IfThenElse(near, hn::Load(d, scale), exact), d, scale);
+  const auto w = hn::Load(d, motion + 3 * kBlock);
+  const auto kick = hn::IfThenElseZero(hn::Ne(w, hn::Zero(d)), hn::Set(d, kick_time)), drift = hn::Set(d, drift_time);
+  const auto move = [&](int k, V<S> f, V<S> high, [[maybe_unused]] V<S> x_low) HWY_ATTR {
+    auto more = hn::Set(d, gravity[k]);
+    if constexpr (pushed) more = hn::Add(more, hn::Load(d, push + k * kBlock));
+    S *v_at = motion + k * kBlock, *to = next + k * st;
+    const auto acceleration = hn::MulAdd(f, w, more);
+    if constexpr (low) {
+      S* v_low_at = v_at + 4 * kBlock;
+      auto v = hn::Load(d, v_at), v_low = hn::Load(d, v_low_at);
+      add_exactly<S>(v, v_low, hn::Mul(kick, acceleration));
+      add_exactly<S>(high, x_low, hn::MulAdd(drift, v, hn::Mul(drift, v_low)));
+      hn::Store(v, d, v_at), hn::Store(v_low, d, v_low_at);
+      hn::Store(high, d, to), hn::Store(x_low, d, to + 3 * st);
+    } else {
+      const auto v = hn::MulAdd(kick, acceleration, hn::Load(d, v_at));
+      hn::Store(v, d, v_at);
+      hn::Store(hn::MulAdd(drift, v, high), d, to);
     }
-  }
+  };
+  move(0, force.x, a.x, a.low_x), move(1, force.y, a.y, a.low_y), move(2, force.z, a.z, a.low_z);
 }
 
-// Force over length of the springs that begin in row r. In two loops, the deviations l²/L² - 1 first: processors do not
-// look far enough ahead to work on so many springs at once that their latencies would not show.
-template <bool low, class S>
-void scale_row(const GridState<S>& grid, const GridWake<S>& wake, Index r, const Row<S>& row) {
-  const Tag<S> d;
-  constexpr int kLanes = int(hn::MaxLanes(d)), kBlock = kColumns<S>;
-  const std::ptrdiff_t st = grid.stride;
-  S* HWY_RESTRICT old = grid.old(wake, r);
-  const S *stiffness = grid.stiffness[r], *rest = grid.rest[r], *inverse = grid.inverse[r];
-  for (Index block = 0; block < grid.blocks; ++block)
-    for (int lane = 0; lane < kBlock; lane += kLanes) {
-      const Index c = block * kBlock + lane, at = block * 6 * kBlock + lane;
-      const auto a = place<low, S>(row.x + c, st);
-      hn::Store(a.x, d, old + c), hn::Store(a.y, d, old + st + c), hn::Store(a.z, d, old + 2 * st + c);
-      if constexpr (low) {
-        S* old_low = old + 3 * st + c;
-        hn::Store(a.low_x, d, old_low), hn::Store(a.low_y, d, old_low + st), hn::Store(a.low_z, d, old_low + 2 * st);
-      }
-      for (int i = 0; i < kDirections; ++i) {
-        V<S> dx, dy, dz;
-        difference<low, S>(a, row.to[i] + c, st, dx, dy, dz);
-        const auto more = hn::Sub(squared_length(d, dx, dy, dz), hn::Load(d, rest + at + i * kBlock));
-        hn::Store(hn::Mul(more, hn::Load(d, inverse + at + i * kBlock)), d, row.scale[i] + c);
-      }
-    }
-  for (Index block = 0; block < grid.blocks; ++block) {
-    auto worst = hn::Zero(d);
-    for (int i = 0; i < kDirections; ++i)
-      for (int lane = 0; lane < kBlock; lane += kLanes) {
-        S* scale = row.scale[i] + block * kBlock + lane;
-        const auto e = hn::Load(d, scale);
-        worst = hn::Max(worst, hn::Abs(e));
-        hn::Store(hn::Mul(hn::Mul(hn::Load(d, stiffness + (block * 6 + i) * kBlock + lane), e), near_rest(d, e)), d,
-                  scale);
-      }
-    if (HWY_UNLIKELY(!hn::AllTrue(d, hn::Le(worst, hn::Set(d, kNear<S>))))) scale_far<low, S>(grid, row, r, block);
-  }
-}
-
-// One stage on the points of row r, after the springs that begin in it.
-template <bool pushed, bool low, class S>
-void step_row(const GridState<S>& grid, const GridWake<S>& wake, Index r, const Stage& stage, const Row<S>& row) {
+// The springs that begin in row r, with the two rows below; then, where `stepped`, one stage on its points. Springs
+// lead to the right and down alone, so a vector of columns may be stepped where it lies as soon as its springs are
+// done; what they pull at further on is summed up on the way: in the row itself in registers, below it in the wake.
+template <bool stepped, bool pushed, bool low, class S>
+void row(const GridState<S>& grid, const GridWake<S>& wake, Index r, const Stage& stage, const S* x1, const S* x2) {
   const Tag<S> d;
   constexpr int kLanes = int(hn::MaxLanes(d)), kBlock = kColumns<S>, kFields = low ? 7 : 4;
   const std::ptrdiff_t st = grid.stride;
-  const auto kick = hn::Set(d, S(stage.kick)), drift = hn::Set(d, S(stage.drift));
-  const auto gx = hn::Set(d, grid.gravity[0]), gy = hn::Set(d, grid.gravity[1]), gz = hn::Set(d, grid.gravity[2]);
-  const S *s0 = grid.near(wake, r), *s1 = grid.near(wake, r - 1), *far = grid.far(wake, r),
-          *far2 = grid.far(wake, r - 2);
-  const S *x0 = grid.old(wake, r), *x1 = row.to[kDown], *x2 = row.to[kDown2], *u1 = grid.old(wake, r - 1),
-          *u2 = grid.old(wake, r - 2);
-  S* HWY_RESTRICT next = grid.position(r);
-  S* HWY_RESTRICT motion = grid.motion + r * grid.blocks * kFields * kBlock;
+  const S kick = S(stage.kick), drift = S(stage.drift),
+          gravity[3] = {grid.gravity[0], grid.gravity[1], grid.gravity[2]};
+  S *x0 = grid.position(r), *motion = grid.motion + r * grid.blocks * kFields * kBlock;
+  S *next = wake.next, *next2 = wake.next2;
   const S* push = pushed ? grid.push + r * grid.blocks * 3 * kBlock : nullptr;
-  for (Index block = 0; block < grid.blocks; ++block) {
+  Springs<S> springs{grid.stiffness[r], grid.rest[r], grid.inverse[r]};
+  Carry<1, S> one, one_down;
+  Carry<2, S> two;
+  for (Index block = grid.blocks; block > 0; --block) {
     for (int lane = 0; lane < kBlock; lane += kLanes) {
       const auto a = place<low, S>(x0, st);
-      // Three sums that do not wait for each other: from above, along the row, from below.
-      V<S> fx, fy, fz;
-      const auto pull = [&](const S* to, const S* scale) HWY_ATTR {
-        const auto s = hn::LoadU(d, scale);
-        V<S> x, y, z;
-        difference<low, S>(a, to, st, x, y, z);
-        fx = hn::NegMulAdd(s, x, fx), fy = hn::NegMulAdd(s, y, fy), fz = hn::NegMulAdd(s, z, fz);
-      };
-      fx = hn::Zero(d), fy = fx, fz = fx;
-      pull(u2, far2), pull(u1, s1 + kDown * st);
-      pull(u1 - 1, s1 + kDiagonal * st - 1), pull(u1 + 1, s1 + kAntidiagonal * st + 1);
-      auto sx = fx, sy = fy, sz = fz;
-      fx = hn::Zero(d), fy = fx, fz = fx;
-      pull(x0 - 2, s0 + kRight2 * st - 2), pull(x0 - 1, s0 - 1), pull(x0 + 1, s0), pull(x0 + 2, s0 + kRight2 * st);
-      sx = hn::Add(sx, fx), sy = hn::Add(sy, fy), sz = hn::Add(sz, fz);
-      fx = hn::Zero(d), fy = fx, fz = fx;
-      pull(x1 - 1, s0 + kAntidiagonal * st), pull(x1 + 1, s0 + kDiagonal * st), pull(x1, s0 + kDown * st);
-      pull(x2, far);
-      fx = hn::Add(sx, fx), fy = hn::Add(sy, fy), fz = hn::Add(sz, fz);
-      const auto w = hn::Load(d, motion + 3 * kBlock + lane);
-      const auto free = hn::Ne(w, hn::Zero(d));
-      const auto step = [&](int k, V<S> f, V<S> g, V<S> high, [[maybe_unused]] V<S> x_low) HWY_ATTR {
-        auto more = hn::IfThenElseZero(free, g);
-        if constexpr (pushed) more = hn::Add(more, hn::Load(d, push + k * kBlock + lane));
-        S *v_at = motion + k * kBlock + lane, *to = next + k * st;
-        const auto acceleration = hn::MulAdd(f, w, more);
-        if constexpr (low) {
-          S* v_low_at = v_at + 4 * kBlock;
-          auto v = hn::Load(d, v_at), v_low = hn::Load(d, v_low_at);
-          add_exactly<S>(v, v_low, hn::Mul(kick, acceleration));
-          add_exactly<S>(high, x_low, hn::MulAdd(drift, v, hn::Mul(drift, v_low)));
-          hn::Store(v, d, v_at), hn::Store(v_low, d, v_low_at);
-          hn::Store(high, d, to), hn::Store(x_low, d, to + 3 * st);
-        } else {
-          const auto v = hn::MulAdd(kick, acceleration, hn::Load(d, v_at));
-          hn::Store(v, d, v_at);
-          hn::Store(hn::MulAdd(drift, v, high), d, to);
-        }
-      };
-      step(0, fx, gx, a.x, a.low_x), step(1, fy, gy, a.y, a.low_y), step(2, fz, gz, a.z, a.low_z);
-      x0 += kLanes, x1 += kLanes, x2 += kLanes, u1 += kLanes, u2 += kLanes, next += kLanes;
-      s0 += kLanes, s1 += kLanes, far += kLanes, far2 += kLanes;
+      Way<S> w[kDirections];
+      ways<low, S>(a, x0, x1, x2, st, w);
+      V<S> scale[kDirections];
+      scale_springs<low, S>(x0, x1, x2, st, springs, w, scale);
+      const Way<S> above = load_way<S>(next, st);
+      Way<S> down = load_way<S>(next2, st), up1 = times<S>(scale[kRight], w[kRight]);
+      store_way<S>(times<S>(scale[kDown2], w[kDown2]), next2, st);
+      add_to<S>(down, scale[kDown], w[kDown]), add_to<S>(down, scale[kAntidiagonal], w[kAntidiagonal]);
+      const Way<S> diagonal = one_down.pass(times<S>(scale[kDiagonal], w[kDiagonal]));
+      store_way<S>({hn::Add(down.x, diagonal.x), hn::Add(down.y, diagonal.y), hn::Add(down.z, diagonal.z)}, next, st);
+      if constexpr (stepped) {
+        Way<S> force{hn::MulSub(scale[kRight], w[kRight].x, above.x), hn::MulSub(scale[kRight], w[kRight].y, above.y),
+                     hn::MulSub(scale[kRight], w[kRight].z, above.z)};
+        for (const int i : {kRight2, kDown, kDiagonal, kDown2}) add_to<S>(force, scale[i], w[i]);
+        up1 = {hn::NegMulAdd(scale[kAntidiagonal], w[kAntidiagonal].x, up1.x),
+               hn::NegMulAdd(scale[kAntidiagonal], w[kAntidiagonal].y, up1.y),
+               hn::NegMulAdd(scale[kAntidiagonal], w[kAntidiagonal].z, up1.z)};
+        const Way<S> from1 = one.pass(up1);
+        const Way<S> from2 = two.pass(times<S>(scale[kRight2], w[kRight2]));
+        force.x = hn::Sub(force.x, hn::Add(from1.x, from2.x)), force.y = hn::Sub(force.y, hn::Add(from1.y, from2.y));
+        force.z = hn::Sub(force.z, hn::Add(from1.z, from2.z));
+        step<pushed, low, S>(force, a, kick, drift, gravity, motion + lane, pushed ? push + lane : nullptr, x0, st);
+      }
+      x0 += kLanes, x1 += kLanes, x2 += kLanes, next += kLanes, next2 += kLanes;
+      springs.go_on(kLanes);
     }
+    springs.go_on((kDirections - 1) * kBlock);
     motion += kFields * kBlock;
     if constexpr (pushed) push += 3 * kBlock;
   }
@@ -287,13 +324,12 @@ void drift_row(const GridState<S>& grid, Index r, S drift) {
 
 template <bool low, class S>
 void row(const GridState<S>& grid, const GridWake<S>& wake, Index r, const Stage* stage, const S* x1, const S* x2) {
-  const Row<S> row = row_of(grid, wake, r, x1, x2);
-  scale_row<low, S>(grid, wake, r, row);
-  if (!stage) return;
-  if (grid.push)
-    step_row<true, low, S>(grid, wake, r, *stage, row);
+  if (!stage)
+    row<false, false, low, S>(grid, wake, r, {}, x1, x2);
+  else if (grid.push)
+    row<true, true, low, S>(grid, wake, r, *stage, x1, x2);
   else
-    step_row<false, low, S>(grid, wake, r, *stage, row);
+    row<true, false, low, S>(grid, wake, r, *stage, x1, x2);
 }
 
 // A stage on row r, with the two below it; without one, no more than its springs.
@@ -308,22 +344,19 @@ void row(const GridState<S>& grid, const GridWake<S>& wake, Index r, const Stage
 // Nothing pulls on the first row from above.
 template <class S>
 void begin_wake(const GridState<S>& grid, const GridWake<S>& wake) {
-  std::fill_n(grid.near(wake, -1) - kColumns<S>, 5 * grid.stride, S(0));
-  for (Index r = -2; r < 0; ++r) {
-    std::fill_n(grid.far(wake, r) - kColumns<S>, grid.stride, S(0));
-    std::fill_n(grid.old(wake, r) - kColumns<S>, grid.planes() * grid.stride, S(0));
-  }
+  std::fill_n(wake.next, 3 * grid.stride, S(0));
+  std::fill_n(wake.next2, 3 * grid.stride, S(0));
 }
 
-// A stage needs two rows ahead of the one it steps, so the next stage may follow three rows behind.
+// A stage needs two rows below the one it steps, so the next stage may follow two rows behind.
 template <class S>
 void run_together(const GridState<S>& grid, std::span<const Stage> stages) {
   while (!stages.empty()) {
     const std::size_t together = std::min(grid.together, stages.size());
     for (std::size_t i = 0; i < together; ++i) begin_wake(grid, grid.wakes[i]);
-    for (Index front = 0; front < grid.rows + 3 * Index(together - 1); ++front)
+    for (Index front = 0; front < grid.rows + 2 * Index(together - 1); ++front)
       for (std::size_t i = 0; i < together; ++i) {
-        const Index r = front - 3 * Index(i);
+        const Index r = front - 2 * Index(i);
         if (r < 0 || r >= grid.rows) continue;
         if (stages[i].kick == 0)
           drift_row(grid, r, S(stages[i].drift));
@@ -472,8 +505,7 @@ class GridStepper final : public Stepper<O> {
       for (int k = 0; k < 3; ++k) {
         O *x = &points.position(r * columns_, k), *v = &points.velocity(r * columns_, k);
         const S* from = state_.position(r) + k * state_.stride;
-        for (Index c = 0; c < columns_; c += kBlock) {
-          const Index n = std::min<Index>(kBlock, columns_ - c);
+        by_blocks([&](Index c, auto n) {
           const S *high = from + c, *low = high + 3 * state_.stride;
           const S *v_high = state_.motion + at(r, c, fields, k), *v_low = v_high + 4 * kBlock;
           for (Index i = 0; i < n; ++i) {
@@ -484,7 +516,7 @@ class GridStepper final : public Stepper<O> {
               low_parts.velocity(r * columns_ + c + i, k) = O(v_high[i] - S(v[c + i]));
             }
           }
-        }
+        });
       }
   }
 
@@ -518,13 +550,11 @@ class GridStepper final : public Stepper<O> {
 
   void make_wakes(std::size_t n) {
     wakes_.resize(n);
-    const std::ptrdiff_t near = 2 * 5 * state_.stride, far = 4 * state_.stride,
-                         one = near + far + 4 * state_.planes() * state_.stride;
-    rings_.resize(n * std::size_t(one));
+    const std::ptrdiff_t one = 3 * state_.stride;
+    rings_.resize(n * std::size_t(2 * one));
     for (std::size_t i = 0; i < n; ++i) {
-      wakes_[i].near = rings_.data() + std::ptrdiff_t(i) * one;
-      wakes_[i].far = wakes_[i].near + near;
-      wakes_[i].old = wakes_[i].far + far;
+      wakes_[i].next = rings_.data() + std::ptrdiff_t(2 * i) * one;
+      wakes_[i].next2 = wakes_[i].next + one;
     }
     state_.wakes = wakes_;
   }
@@ -536,8 +566,18 @@ class GridStepper final : public Stepper<O> {
 
   template <class Convert>
   void to_blocks(const O* from, Index r, int fields, int field, S* to, Convert convert) const {
-    for (Index c = 0; c < columns_; c += kBlock)
-      std::transform(from + c, from + std::min(c + kBlock, columns_), to + at(r, c, fields, field), convert);
+    by_blocks([&](Index c, auto n) {
+      S* block = to + at(r, c, fields, field);
+      for (Index i = 0; i < n; ++i) block[i] = convert(from[c + i]);
+    });
+  }
+
+  // action(c, n) for every block of n columns from c on. All but the last have a length that compilers know.
+  template <class Action>
+  void by_blocks(const Action& action) const {
+    Index c = 0;
+    for (; c + kBlock <= columns_; c += kBlock) action(c, std::integral_constant<Index, kBlock>());
+    if (c < columns_) action(c, columns_ - c);
   }
 
   // As the kernel takes it.
@@ -557,10 +597,7 @@ class GridStepper final : public Stepper<O> {
       for (int direction = 0; direction < kDirections; ++direction) {
         std::fill(difference.begin(), difference.end(), S(1));
         for (Index c = 0; c < columns_; ++c) {
-          // An antidiagonal spring is worked on with its upper end, which is one column further.
-          const Index point = r * columns_ + c - (direction == kAntidiagonal);
-          if (point < r * columns_) continue;
-          const int index = grid.springs[std::size_t(direction)][std::size_t(point)];
+          const int index = grid.springs[std::size_t(direction)][std::size_t(r * columns_ + c)];
           if (index < 0) continue;
           const Spring& spring = network.springs[std::size_t(index)];
           stiffness[std::size_t(at(0, c, 6, direction))] = S(O(spring.stiffness));

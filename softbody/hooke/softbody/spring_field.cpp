@@ -203,19 +203,31 @@ template <class S>
 double SpringField<S>::potential_energy(const Points<S>& x) const {
   double sum = 0;
   SpringBlock<S> block;
+  const auto add = [&](Index first, int n) {
+    block.n = n;
+    block.stiffness = stiffness_.data() + first, block.rest = rest_.data() + first;
+    sum += spring_energy(block);
+  };
+  for (const Run& run : runs_)
+    for (Index done = 0; done < run.count; done += kBlock) {
+      for (int k = 0; k < 3; ++k) {
+        block.a[k] = x.col(k).data() + run.a + done;
+        block.b[k] = x.col(k).data() + run.b + done;
+      }
+      add(run.first + done, int(std::min<Index>(kBlock, run.count - done)));
+    }
   S gathered[6][kBlock];
   for (int k = 0; k < 3; ++k) block.a[k] = gathered[k], block.b[k] = gathered[3 + k];
-  for (Index first = 0; first < size(); first += kBlock) {
-    block.n = int(std::min<Index>(kBlock, size() - first));
-    block.stiffness = stiffness_.data() + first, block.rest = rest_.data() + first;
+  for (Index first = loose_; first < size(); first += kBlock) {
+    const int n = int(std::min<Index>(kBlock, size() - first));
     for (int k = 0; k < 3; ++k) {
       const S* column = x.col(k).data();
-      for (int i = 0; i < block.n; ++i) {
+      for (int i = 0; i < n; ++i) {
         gathered[k][i] = column[a_[std::size_t(first + i)]];
         gathered[3 + k][i] = column[b_[std::size_t(first + i)]];
       }
     }
-    sum += spring_energy(block);
+    add(first, n);
   }
   return sum;
 }
