@@ -4,7 +4,7 @@
 namespace hooke {
 
 /// Watches the energy of a body to which nothing gives any. The kinetic energy is looked at every tick; the
-/// total, which costs as much as an evaluation of the forces, only where that has grown by a half since the
+/// total, which costs as much as an evaluation of the forces, only where that has doubled since the
 /// last look: a few dozen times while a motion blows up, and hardly ever where it does not.
 class EnergyWatch {
  public:
@@ -22,15 +22,18 @@ class EnergyWatch {
     known_ = true, start_ = total, looked_at_ = kinetic, rounding_ = rounding;
   }
   /// True where `judge` must be asked.
-  bool due(double kinetic) const { return known_ && kinetic > 1.5 * looked_at_ && kinetic > rounding_; }
+  bool due(double kinetic) const { return known_ && kinetic > 2 * looked_at_ && kinetic > rounding_; }
   Finding judge(double total, double kinetic) {
     looked_at_ = kinetic;
     const double gain = total - start_ - rounding_;
-    return gain > 0.5 * kinetic ? Finding::Grew : gain > 0.1 * kinetic ? Finding::Grows : Finding::Fine;
+    return gain > 0.5 * kinetic ? Finding::Grew : gain > kGrows * kinetic ? Finding::Grows : Finding::Fine;
   }
+  /// The largest total [J] that `judge` finds nothing wrong with.
+  double fine_up_to(double kinetic) const { return start_ + rounding_ + kGrows * kinetic; }
   double gain(double total) const { return total - start_; }  ///< [J] since `start`
 
  private:
+  static constexpr double kGrows = 0.1;
   bool known_ = false;
   double start_ = 0, looked_at_ = 0, rounding_ = 0;
 };

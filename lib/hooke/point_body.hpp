@@ -11,7 +11,9 @@
 #include <hooke/surroundings.hpp>
 
 #include <deque>
+#include <limits>
 #include <memory>
+#include <optional>
 #include <utility>
 
 namespace hooke {
@@ -187,7 +189,7 @@ class PointBody : public Body, protected Dynamics<S> {
   double free_mass();
   double unbalanced(const Points<S>& x, Points<S>& left);
   bool alone() const;
-  double kept_energy();
+  double kept_energy(double enough = -std::numeric_limits<double>::infinity());
   void begin_energy_watch();
   StepReport watch_energy(double kinetic);
   void check_step();
@@ -229,6 +231,10 @@ class PointBody : public Body, protected Dynamics<S> {
   std::vector<StepReport> warnings_;
   bool warned_of_energy_ = false, warned_of_step_ = false;
   double step_checked_ = -1, checked_limit_ = 0;
+
+  // Several ask for these before a tick, of the same positions.
+  mutable std::optional<typename ForceField<S>::Rates> rates_;
+  bool before_tick_ = false;
 
   // While a failed tick is run once more to find out what went wrong.
   bool watching_ = false;
