@@ -14,6 +14,7 @@
 #include <hooke/point_body.hpp>
 #include <hooke/softbody/filtered_leapfrog.hpp>
 #include <hooke/softbody/lattice.hpp>
+#include <hooke/softbody/spring_field.hpp>
 
 #include <algorithm>
 #include <cmath>
@@ -109,6 +110,47 @@ double yardstick_error(const PlainSheet& sheet, Precision precision, int steps, 
              reference);
 }
 
+// The stepper of a sheet from rest to kDuration in one go: what the yardstick does, without a body around it.
+template <class S>
+class Kernel {
+ public:
+  Kernel(const SoftBodySettings& sheet, int steps)
+      : field_(sheet.network, sheet.positions.cast<S>()), stepper_(field_.stepper()) {
+    start_.position = sheet.positions.cast<S>();
+    start_.velocity = Points<S>::Zero(start_.position.rows(), 3);
+    start_.mass = sheet.masses.cast<S>();
+    start_.inverse_mass = start_.mass.inverse();
+    for (const Index pin : sheet.pins) start_.inverse_mass[pin] = 0;
+    const double h = kDuration / steps;
+    stages_.assign(std::size_t(steps), {h, h});
+    stages_.front().kick = h / 2;
+    stages_.push_back({h / 2, 0});
+  }
+
+  Run run() const {
+    LowParts<S> low;
+    PointMasses<S> end = start_;
+    stepper_->load(start_, {}, {0, -9.81, 0}, nullptr);
+    Run out;
+    const double begin = cpu_seconds();
+    stepper_->run(stages_, nullptr);
+    out.seconds = cpu_seconds() - begin;
+    stepper_->store(end, low);
+    out.positions = end.position.template cast<double>();
+    return out;
+  }
+
+ private:
+  softbody::SpringField<S> field_;
+  std::unique_ptr<Stepper<S>> stepper_;
+  PointMasses<S> start_;
+  std::vector<Stage> stages_;
+};
+
+Run run_kernel(const SoftBodySettings& sheet, Precision precision, int steps) {
+  return precision == Precision::Float ? Kernel<float>(sheet, steps).run() : Kernel<double>(sheet, steps).run();
+}
+
 // 1. The same steps as the yardstick's.
 Table kernel(const Effort& effort) {
   const int n = 64, steps = int(std::lround(kDuration / yardstick_step(n)));
@@ -117,6 +159,7 @@ Table kernel(const Effort& effort) {
     SoftBodySettings sheet;
     PlainSheet plain_sheet;
     Points<double> answer;
+    bool alone = false;  // the kernel without ticks
   };
   std::vector<Case> cases;
   const Reference reference = converged(hanging_sheet(n));
@@ -126,6 +169,12 @@ Table kernel(const Effort& effort) {
     cases.push_back(
         {name, sheet, plain(sheet), form == Form::Grid ? reference.positions : shuffle(reference.positions)});
   }
+#ifdef HOOKE_BENCH_HAS_HIGHWAY
+  for (std::size_t i = 0; i < 3; i += 2) {
+    cases.push_back(cases[i]);
+    cases.back().name = i == 0 ? "grid, kernel alone" : "mesh, kernel alone", cases.back().alone = true;
+  }
+#endif
   Table table("kernel",
               "Kernel: hanging sheet, 64 × 64, velocity Verlet at the yardstick's steps of 1/2880 s, one thread",
               {"sheet", "precision", "Hooke, ns per spring and step", "error after 0.5 s, m",
@@ -136,8 +185,11 @@ Table kernel(const Effort& effort) {
       return moved_by(c.sheet, velocity_verlet(), precision, yardstick_step(n));
     };
     std::vector<Contender> turns;
-    for (const Case& c : cases)
-      turns.push_back(ours(moved(c))), turns.push_back(yardstick(c.plain_sheet, precision, steps));
+    const auto run_of = [&](const Case& c) { return c.alone ? run_kernel(c.sheet, precision, steps) : run(moved(c)); };
+    for (const Case& c : cases) {
+      turns.push_back({[&] { return run_of(c).seconds; }, {}});
+      turns.push_back(yardstick(c.plain_sheet, precision, steps));
+    }
     take_turns(turns, effort.rounds());
     for (std::size_t i = 0; i < cases.size(); ++i) {
       const Contender &mine = turns[2 * i], &other = turns[2 * i + 1];
@@ -147,7 +199,7 @@ Table kernel(const Effort& effort) {
       table.add({c.name,
                  text_of(precision),
                  {1e9 * mine.least() / springs / steps, "%.2f"},
-                 {rms(run(moved(c)).positions, c.answer), "%.1e"},
+                 {rms(run_of(c).positions, c.answer), "%.1e"},
                  {1e9 * other.least() / springs / steps, "%.2f"},
                  {yardstick_error(c.plain_sheet, precision, steps, c.answer), "%.1e"},
                  {ratio.median, "%.1f"},
@@ -159,6 +211,9 @@ Table kernel(const Effort& effort) {
                 "Reference: Blanes-Moan 6 in double; halving its step last moved it by %.1e m. %d pairs.",
                 reference.uncertainty, effort.rounds());
   table.note(text);
+  table.note(
+      "A sheet is a whole run of a world, with everything that its ticks look at; the kernel alone does what the "
+      "yardstick does.");
   return table;
 }
 
