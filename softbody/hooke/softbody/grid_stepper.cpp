@@ -24,7 +24,7 @@ namespace hooke::softbody {
 template <class S>
 constexpr int kColumns = int(64 / sizeof(S));
 
-// Stages whose old rows a band has seen, and those it has finished.
+// Stages that a band's first two rows have taken, and those it has finished.
 struct alignas(64) GridBand {
   std::atomic<int> ready{0};
   alignas(64) std::atomic<int> done{0};
@@ -55,12 +55,10 @@ struct GridState {
   int bands;
   std::size_t together;
   GridBand* band;
-  S* halo;  // by band: its first two rows as they were before the stage
 
   Index first(int b) const { return rows * b / bands; }
   int planes() const { return low ? 6 : 3; }
   int fields() const { return low ? 7 : 4; }
-  S* edge(int b, int row) const { return halo + (b * 2 + row) * planes() * stride + kColumns<S>; }
   S* position(Index row) const { return x + row * planes() * stride + kColumns<S>; }
 };
 
@@ -246,16 +244,17 @@ HWY_INLINE void step(const Way<S>& force, const Place<low, S>& a, S kick_time, S
   move(0, force.x, a.x, a.low_x), move(1, force.y, a.y, a.low_y), move(2, force.z, a.z, a.low_z);
 }
 
-// The springs that begin in row r, with the two rows below; then, where `stepped`, one stage on its points. Springs
-// lead to the right and down alone, so a vector of columns may be stepped where it lies as soon as its springs are
-// done; what they pull at further on is summed up on the way: in the row itself in registers, below it in the wake.
-template <bool stepped, bool pushed, bool low, class S>
-void row(const GridState<S>& grid, const GridWake<S>& wake, Index r, const Stage& stage, const S* x1, const S* x2) {
+// The springs that begin in row r, and one stage on its points. Springs lead to the right and down alone, so a vector
+// of columns may be stepped where it lies as soon as its springs are done; what they pull at further on is summed up on
+// the way: in the row itself in registers, below it in the wake.
+template <bool pushed, bool low, class S>
+void row(const GridState<S>& grid, const GridWake<S>& wake, Index r, const Stage& stage) {
   const Tag<S> d;
   constexpr int kLanes = int(hn::MaxLanes(d)), kBlock = kColumns<S>, kFields = low ? 7 : 4;
   const std::ptrdiff_t st = grid.stride;
   const S kick = S(stage.kick), drift = S(stage.drift),
           gravity[3] = {grid.gravity[0], grid.gravity[1], grid.gravity[2]};
+  const S *x1 = grid.position(r + 1), *x2 = grid.position(r + 2);
   S *x0 = grid.position(r), *motion = grid.motion + r * grid.blocks * kFields * kBlock;
   S *next = wake.next, *next2 = wake.next2;
   const S* push = pushed ? grid.push + r * grid.blocks * 3 * kBlock : nullptr;
@@ -275,19 +274,17 @@ void row(const GridState<S>& grid, const GridWake<S>& wake, Index r, const Stage
       add_to<S>(down, scale[kDown], w[kDown]), add_to<S>(down, scale[kAntidiagonal], w[kAntidiagonal]);
       const Way<S> diagonal = one_down.pass(times<S>(scale[kDiagonal], w[kDiagonal]));
       store_way<S>({hn::Add(down.x, diagonal.x), hn::Add(down.y, diagonal.y), hn::Add(down.z, diagonal.z)}, next, st);
-      if constexpr (stepped) {
-        Way<S> force{hn::MulSub(scale[kRight], w[kRight].x, above.x), hn::MulSub(scale[kRight], w[kRight].y, above.y),
-                     hn::MulSub(scale[kRight], w[kRight].z, above.z)};
-        for (const int i : {kRight2, kDown, kDiagonal, kDown2}) add_to<S>(force, scale[i], w[i]);
-        up1 = {hn::NegMulAdd(scale[kAntidiagonal], w[kAntidiagonal].x, up1.x),
-               hn::NegMulAdd(scale[kAntidiagonal], w[kAntidiagonal].y, up1.y),
-               hn::NegMulAdd(scale[kAntidiagonal], w[kAntidiagonal].z, up1.z)};
-        const Way<S> from1 = one.pass(up1);
-        const Way<S> from2 = two.pass(times<S>(scale[kRight2], w[kRight2]));
-        force.x = hn::Sub(force.x, hn::Add(from1.x, from2.x)), force.y = hn::Sub(force.y, hn::Add(from1.y, from2.y));
-        force.z = hn::Sub(force.z, hn::Add(from1.z, from2.z));
-        step<pushed, low, S>(force, a, kick, drift, gravity, motion + lane, pushed ? push + lane : nullptr, x0, st);
-      }
+      Way<S> force{hn::MulSub(scale[kRight], w[kRight].x, above.x), hn::MulSub(scale[kRight], w[kRight].y, above.y),
+                   hn::MulSub(scale[kRight], w[kRight].z, above.z)};
+      for (const int i : {kRight2, kDown, kDiagonal, kDown2}) add_to<S>(force, scale[i], w[i]);
+      up1 = {hn::NegMulAdd(scale[kAntidiagonal], w[kAntidiagonal].x, up1.x),
+             hn::NegMulAdd(scale[kAntidiagonal], w[kAntidiagonal].y, up1.y),
+             hn::NegMulAdd(scale[kAntidiagonal], w[kAntidiagonal].z, up1.z)};
+      const Way<S> from1 = one.pass(up1);
+      const Way<S> from2 = two.pass(times<S>(scale[kRight2], w[kRight2]));
+      force.x = hn::Sub(force.x, hn::Add(from1.x, from2.x)), force.y = hn::Sub(force.y, hn::Add(from1.y, from2.y));
+      force.z = hn::Sub(force.z, hn::Add(from1.z, from2.z));
+      step<pushed, low, S>(force, a, kick, drift, gravity, motion + lane, pushed ? push + lane : nullptr, x0, st);
       x0 += kLanes, x1 += kLanes, x2 += kLanes, next += kLanes, next2 += kLanes;
       springs.go_on(kLanes);
     }
@@ -322,23 +319,15 @@ void drift_row(const GridState<S>& grid, Index r, S drift) {
       }
 }
 
-template <bool low, class S>
-void row(const GridState<S>& grid, const GridWake<S>& wake, Index r, const Stage* stage, const S* x1, const S* x2) {
-  if (!stage)
-    row<false, false, low, S>(grid, wake, r, {}, x1, x2);
-  else if (grid.push)
-    row<true, true, low, S>(grid, wake, r, *stage, x1, x2);
-  else
-    row<true, false, low, S>(grid, wake, r, *stage, x1, x2);
-}
-
-// A stage on row r, with the two below it; without one, no more than its springs.
+// A stage on row r, after those above it.
 template <class S>
-void row(const GridState<S>& grid, const GridWake<S>& wake, Index r, const Stage* stage, const S* x1, const S* x2) {
+void row(const GridState<S>& grid, const GridWake<S>& wake, Index r, const Stage& stage) {
+  if (stage.kick == 0) return drift_row(grid, r, S(stage.drift));
   if constexpr (sizeof(S) == 4) {
-    if (grid.low) return row<true, S>(grid, wake, r, stage, x1, x2);
+    if (grid.low)
+      return grid.push ? row<true, true, S>(grid, wake, r, stage) : row<false, true, S>(grid, wake, r, stage);
   }
-  row<false, S>(grid, wake, r, stage, x1, x2);
+  grid.push ? row<true, false, S>(grid, wake, r, stage) : row<false, false, S>(grid, wake, r, stage);
 }
 
 // Nothing pulls on the first row from above.
@@ -358,50 +347,33 @@ void run_together(const GridState<S>& grid, std::span<const Stage> stages) {
       for (std::size_t i = 0; i < together; ++i) {
         const Index r = front - 2 * Index(i);
         if (r < 0 || r >= grid.rows) continue;
-        if (stages[i].kick == 0)
-          drift_row(grid, r, S(stages[i].drift));
-        else
-          row(grid, grid.wakes[i], r, &stages[i], grid.position(r + 1), grid.position(r + 2));
+        row(grid, grid.wakes[i], r, stages[i]);
       }
     stages = stages.subspan(together);
   }
 }
 
-// Rows [first, last) of one band. Springs that cross its upper edge are worked on twice, by both bands, from
-// the same old positions: the same bits as in one pass over all rows. Before the band below steps
-// its first rows it keeps their old positions for us; before we step our last rows it has used them.
+// Rows [first, last) of one band. A stage goes from band to band with its wake, so each band is a stage ahead of the
+// one below, which has stepped its first rows long before the band above comes to need them: the same order, and the
+// same bits, as in one pass over all rows after the other. A band is never three stages ahead, so two wakes a band are
+// enough.
 template <class S>
 void run_band(const GridState<S>& grid, std::span<const Stage> stages, int b) {
   const Index first = grid.first(b), last = grid.first(b + 1);
   const bool above = b > 0, below = b + 1 < grid.bands;
-  const GridWake<S>& wake = grid.wakes[std::size_t(b)];
   GridBand& own = grid.band[b];
-  for (std::size_t i = 0; i < stages.size(); ++i) {
-    const Stage& stage = stages[i];
-    if (stage.kick == 0) {
-      for (Index r = first; r < last; ++r) drift_row(grid, r, S(stage.drift));
-      own.ready.store(int(i) + 1, std::memory_order_release);
-      own.done.store(int(i) + 1, std::memory_order_release);
-      continue;
-    }
-    if (above) {
-      wait_for(grid.band[b - 1].done, int(i));
-      for (int k = 0; k < 2; ++k)
-        std::copy_n(grid.position(first + k) - kColumns<S>, grid.planes() * grid.stride, grid.edge(b, k) - kColumns<S>);
-      for (Index r = first - 2; r < first; ++r)
-        row<S>(grid, wake, r, nullptr, grid.position(r + 1), grid.position(r + 2));
-    } else {
+  for (int i = 0; i < int(stages.size()); ++i) {
+    const GridWake<S>& wake = grid.wakes[std::size_t(i) % grid.wakes.size()];
+    if (above)
+      wait_for(grid.band[b - 1].done, i + 1);
+    else
       begin_wake(grid, wake);
-    }
-    own.ready.store(int(i) + 1, std::memory_order_release);
     for (Index r = first; r < last; ++r) {
-      const auto under = [&](Index row) HWY_ATTR {
-        return below && row >= last ? grid.edge(b + 1, int(row - last)) : grid.position(row);
-      };
-      if (below && r == last - 2) wait_for(grid.band[b + 1].ready, int(i) + 1);
-      row(grid, wake, r, &stage, under(r + 1), under(r + 2));
+      if (below && r == last - 2) wait_for(grid.band[b + 1].ready, i);
+      row(grid, wake, r, stages[std::size_t(i)]);
+      if (r == first + 1) own.ready.store(i + 1, std::memory_order_release);
     }
-    own.done.store(int(i) + 1, std::memory_order_release);
+    own.done.store(i + 1, std::memory_order_release);
   }
 }
 
@@ -486,12 +458,9 @@ class GridStepper final : public Stepper<O> {
       run_one(stages, 0);
       return;
     }
-    if (std::size_t(state_.bands) > wakes_.size()) make_wakes(std::size_t(state_.bands));
-    if (bands_.size() < std::size_t(state_.bands)) {
-      bands_ = std::vector<GridBand>(std::size_t(state_.bands));
-      halo_.resize(std::size_t(state_.bands * 2 * state_.planes() * state_.stride));
-    }
-    state_.band = bands_.data(), state_.halo = halo_.data();
+    if (2 * std::size_t(state_.bands) > wakes_.size()) make_wakes(2 * std::size_t(state_.bands));
+    if (bands_.size() < std::size_t(state_.bands)) bands_ = std::vector<GridBand>(std::size_t(state_.bands));
+    state_.band = bands_.data();
     for (GridBand& band : bands_) band.ready = 0, band.done = 0;
     gang->run([&](int b) {
       if (b < state_.bands) run_one(stages, b);
@@ -645,7 +614,7 @@ class GridStepper final : public Stepper<O> {
 
   Index columns_;
   GridState<S> state_{};
-  Lines<S> x_, motion_, push_, stiffness_, rest_, inverse_, rings_, halo_;
+  Lines<S> x_, motion_, push_, stiffness_, rest_, inverse_, rings_;
   std::vector<const S*> stiffness_row_, rest_row_, inverse_row_;
   std::vector<GridWake<S>> wakes_;
   std::vector<GridBand> bands_;
