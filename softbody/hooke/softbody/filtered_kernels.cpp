@@ -342,13 +342,11 @@ HOOKE_INLINE bool forward(const SheetForward<S>& given) {
       store(y, row.z + k * plane + c);
     }
   }
-  bool near = true;
-  const V limit = nothing + kNear<S> * kNear<S>;
-  Bits most;
-  std::memcpy(&most, &limit, sizeof most);
-  const Bits over = worst > most;
-  for (int i = 0; i < n; ++i) near = near && !over[i];
-  return near;
+  S squares_of_e[n], most = 0;
+  std::memcpy(squares_of_e, &worst, sizeof worst);
+  HOOKE_UNROLL
+  for (int i = 0; i < n; ++i) most = squares_of_e[i] > most ? squares_of_e[i] : most;
+  return most <= kNear<S> * kNear<S>;
 }
 
 // A row in which any spring is out of the reach of the series takes none.

@@ -131,7 +131,7 @@ template <class S>
 void FilteredSheet<S>::factor() {
   double a_x = 0, a_y = 0;
   if (filtered_) {
-    const auto stiffness = plan_.line_stiffness(h_);
+    const auto stiffness = damped_ ? plan_.line_stiffness(h_) : plan_.undamped;
     const double share = (contacts_ ? kShareWithContacts : kShare) * h_ * h_ / 4;
     a_x = share * stiffness.x, a_y = share * stiffness.y;
   }

@@ -29,6 +29,7 @@ struct SheetPlan {
   struct LineStiffness {
     double x = 0, y = 0;  // [1/s²]
   };
+  LineStiffness undamped;  ///< line_stiffness(0)
   LineStiffness line_stiffness(double h) const;
   double extension_under_weight(const Values<double>& mass) const;
   double travel(double h) const;
