@@ -321,7 +321,7 @@ Table threads(const Effort& effort) {
   Table table("threads", "Threads: hanging sheet, velocity Verlet in float, wall-clock time",
               {"N", "run", "ns per spring and step", "times faster than one thread (median of rounds)",
                "times faster (least times)", "same bits as one thread"});
-  for (const int n : effort.quick ? std::vector<int>{64, 128, 256} : std::vector<int>{64, 128, 256, 512}) {
+  for (const int n : effort.quick ? std::vector<int>{64, 128, 256} : std::vector<int>{64, 128, 256, 316, 512}) {
     const double dt = 0.8 * yardstick_step(n);
     const SoftBodySettings sheet = moved_by(hanging_sheet(n), velocity_verlet(), Precision::Float, dt);
     const double springs = double(sheet.network->springs.size());
@@ -523,7 +523,7 @@ Table filtered(const Effort& effort) {
     double n, filtered, plain;
   };
   std::vector<Cost> costs;
-  for (const int n : effort.quick ? std::vector<int>{64, 128} : std::vector<int>{64, 128, 256, 512}) {
+  for (const int n : effort.quick ? std::vector<int>{64, 128} : std::vector<int>{64, 128, 256, 316, 512}) {
     const SoftBodySettings sheet = hanging_sheet(n);
     // Errors here are of millimetres: a reference of velocity Verlet near its limit is sure to a hundredth of that.
     const Points<double> reference =

@@ -8,41 +8,44 @@
 
 namespace hooke::softbody {
 
-/// Rows that a block of row solves takes at once.
+/// Columns of a block, and rows that a block of row solves takes at once: a cache line, whatever the vectors' length.
 template <class S>
-inline constexpr int kLanes = int(32 / sizeof(S));
-
-/// Below this length [m], squared, a spring has no direction. It is added to all squares of lengths.
-template <class S>
-inline constexpr S kTiny = S(1e-24);
+inline constexpr int kLanes = int(64 / sizeof(S));
 
 /// Squares of lengths of n differences x|y|z, the same bits as the springs'.
 void sheet_squares(int n, const float* difference, float* out);
 void sheet_squares(int n, const double* difference, double* out);
 
-/// The forces on a row of a grid, and behind them the first half of the solves down the columns:
-/// z = b - w1 z1 - w2 z2 with b = scale f + mass g. Rows of positions and velocities have three coordinates `pad`
-/// apart, may be read from -1 to columns + 2 and start on a vector, as all others do.
+/// Of the springs that begin in a block of columns of a row, by direction: stiffness, the exact L² and about 1 / L²;
+/// damping: null without dampers.
+template <class S>
+struct SheetSprings {
+  const S *stiffness, *rest, *inverse, *damping;
+};
+
+/// The springs that begin in a row of a grid, the forces on that row and, behind them, the first half of the solves
+/// down the columns: z = b - w1 z1 - w2 z2 with b = scale f + mass g. Positions and velocities may be read up to
+/// columns + 2, past the end of their rows, where no spring acts; all other rows start on a cache line.
 template <class S>
 struct SheetForward {
-  int columns;  // a multiple of kLanes
-  std::ptrdiff_t pad, plane;
-  const S *x[3], *v[3];                 // this row and the next two; v: for dampers only
-  const S *above, *above2;              // positions of the row before, and the one before that
-  S* pull;                              // gets force over length of kDown, kDiagonal, kAntidiagonal, kDown2
-  const S *pull1, *pull2;               // what it got in the two rows before
-  const S *stiffness, *rest, *damping;  // by vector and direction; L then L²; damping: null without dampers.
-                                        // An antidiagonal spring is kept with its upper end
-  const S *scale, *mass;                // by column
+  int columns;                // a multiple of kLanes
+  std::ptrdiff_t pad, plane;  // from coordinate to coordinate, of z and of everything without a distance of its own
+  const S *x[3], *v[3];       // this row and the next two; v: for dampers only
+  std::ptrdiff_t apart[3];    // from coordinate to coordinate of these
+  const S *near, *far;        // minus the forces so far on this row, and on the next
+  S *next_near, *next_far;    // get those on the next, and on the one after that
+  const SheetSprings<S>* springs;  // by block
+  const S *scale, *mass;           // by column
   S gravity[3];
   const S* extra;  // null, or accelerations in place of gravity
   S* right;        // null, or gets b, `pad` apart
   S* z;
   const S *z1, *z2;
   S w1, w2;
+  bool far_from_rest;  // a guess, whether springs are out of the reach of the series; comes back true or false
 };
-void sheet_forward(const SheetForward<float>& row);
-void sheet_forward(const SheetForward<double>& row);
+void sheet_forward(SheetForward<float>& row);
+void sheet_forward(SheetForward<double>& row);
 
 /// Solves kLanes rows from z on in place: the second half down the columns, then along the rows. below[c] =
 /// L(c, c - 1), below2[c] = L(c, c - 2), above[c] = L(c + 1, c), above2[c] = L(c + 2, c) along rows; pivot, next,

@@ -93,11 +93,11 @@ SheetPlan::SheetPlan(std::shared_ptr<const SpringNetwork> given, const Points<do
   };
   width = measure(kRight, grid.columns), height = measure(kDown, grid.rows);
   network = given;
-  const LineStiffness stiff = line_stiffness(0);
+  undamped = line_stiffness(0);
   const auto speed = [](double length, Index count, double rate) {
     return count > 1 ? length / double(count - 1) * std::sqrt(rate) : 0;
   };
-  speed_x = speed(width, grid.columns, stiff.x), speed_y = speed(height, grid.rows, stiff.y);
+  speed_x = speed(width, grid.columns, undamped.x), speed_y = speed(height, grid.rows, undamped.y);
 
   // The slower of both directions decides: c h / L is largest there.
   const bool across = width > 0 && (height == 0 || speed_x / width > speed_y / height);
@@ -116,6 +116,7 @@ SheetPlan::SheetPlan(std::shared_ptr<const SpringNetwork> given, const Points<do
       cap_error = extension * (softer - 1);
       network = softened(given, stiffness_scale);
       speed_x *= std::sqrt(stiffness_scale), speed_y *= std::sqrt(stiffness_scale);
+      undamped.x *= stiffness_scale, undamped.y *= stiffness_scale;
     }
     step = step_of_error(wanted_error - cap_error, length, fastest * std::sqrt(stiffness_scale));
   } else if (dt == 0) {

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <map>
 #include <stdexcept>
 
 namespace hooke::softbody {
@@ -43,65 +42,14 @@ FilteredSheet<S>::FilteredSheet(std::string name, PointMasses<S> points, const M
   even_ = (plan_.mass_model.row == 1).all() && (plan_.mass_model.column == 1).all();
   lay_out_springs();
   z_.resize(std::size_t(3 * plane_));
-  near_x_.resize(std::size_t(15 * pad_));
-  if (damped_) near_v_.resize(std::size_t(15 * pad_));
-  pulls_.resize(std::size_t(12 * pad_));
+  last_x_.resize(std::size_t(9 * pad_));
+  if (damped_) last_v_.resize(std::size_t(9 * pad_));
+  waiting_.resize(std::size_t(12 * pad_));
+  far_from_rest_.assign(std::size_t(rows_), false);
   for (Lines<S>* row : {&scale_row_, &mass_row_, &zero_row_}) row->resize(std::size_t(stride_));
   for (Lines<S>* rows : {&extra_row_, &right_}) rows->resize(std::size_t(3 * pad_));
   wait_.resize(std::size_t(6 * stride_));
   for (Lines<S>* rows : {&add_, &block_}) rows->resize(std::size_t(3 * kLanes<S> * stride_));
-}
-
-// Rows of parameters that are the same are kept once: in a sheet of one material that is nearly all.
-template <class S>
-void FilteredSheet<S>::lay_out_springs() {
-  using Rows = std::map<std::vector<S>, std::vector<Index>>;
-  Rows stiffness_rows, rest_rows, damping_rows;
-  std::vector<S> difference(std::size_t(3 * stride_)), square(static_cast<std::size_t>(stride_));
-  const Points<S>& x = points_.position;
-  const auto place = [](Index column, int fields, int field) {
-    return std::size_t((column / kLanes<S> * fields + field) * kLanes<S> + column % kLanes<S>);
-  };
-  for (Index r = 0; r < rows_; ++r) {
-    std::vector<S> stiffness(std::size_t(6 * stride_), S(0)), damping = stiffness,
-                                                              rest(std::size_t(12 * stride_), S(1));
-    for (int d = 0; d < kDirections; ++d) {
-      std::fill(difference.begin(), difference.end(), S(1));
-      for (Index c = 0; c < columns_; ++c) {
-        // An antidiagonal spring is worked on with its upper end, which is one column further.
-        const Index from = c - (d == kAntidiagonal);
-        const int i = from < 0 ? -1 : plan_.grid.springs[std::size_t(d)][std::size_t(r * columns_ + from)];
-        if (i < 0) continue;
-        const Spring& spring = plan_.network->springs[std::size_t(i)];
-        stiffness[place(c, 6, d)] = S(spring.stiffness), damping[place(c, 6, d)] = S(spring.damping);
-        for (int k = 0; k < 3; ++k)
-          difference[std::size_t(k * stride_ + c)] = spring.rest_length == Spring::kFromStart
-                                                         ? x(spring.b, k) - x(spring.a, k)
-                                                         : S(k == 0 ? spring.rest_length : 0);
-      }
-      sheet_squares(int(stride_), difference.data(), square.data());
-      for (Index c = 0; c < stride_; ++c) {
-        rest[place(c, 12, d)] = std::sqrt(square[std::size_t(c)]);
-        rest[place(c, 12, 6 + d)] = square[std::size_t(c)];
-      }
-    }
-    stiffness_rows[std::move(stiffness)].push_back(r);
-    rest_rows[std::move(rest)].push_back(r);
-    if (damped_) damping_rows[std::move(damping)].push_back(r);
-  }
-  const auto lay = [&](const Rows& rows, Lines<S>& memory, std::vector<const S*>& row) {
-    row.assign(std::size_t(rows_), nullptr);
-    if (rows.empty()) return;
-    memory.resize(rows.size() * rows.begin()->first.size());
-    S* to = memory.data();
-    for (const auto& [values, where] : rows) {
-      for (const Index r : where) row[std::size_t(r)] = to;
-      to = std::copy(values.begin(), values.end(), to);
-    }
-  };
-  lay(stiffness_rows, stiffness_, stiffness_row_);
-  lay(rest_rows, rest_, rest_row_);
-  lay(damping_rows, damping_, damping_row_);
 }
 
 template <class S>
@@ -183,7 +131,7 @@ template <class S>
 void FilteredSheet<S>::factor() {
   double a_x = 0, a_y = 0;
   if (filtered_) {
-    const auto stiffness = plan_.line_stiffness(h_);
+    const auto stiffness = damped_ ? plan_.line_stiffness(h_) : plan_.undamped;
     const double share = (contacts_ ? kShareWithContacts : kShare) * h_ * h_ / 4;
     a_x = share * stiffness.x, a_y = share * stiffness.y;
   }
@@ -278,18 +226,25 @@ void FilteredSheet<S>::weigh_row(Index row, double h) {
   }
 }
 
-// Rows outside of the grid are zero; no spring acts there.
+// Rows are read where they are, past their ends too, but for the last ones: those are copied, and behind them are
+// zeros.
 template <class S>
-void FilteredSheet<S>::fetch_row(Index row) {
-  const auto fetch = [&](const Points<S>& from, S* to) {
-    for (int k = 0; k < 3; ++k, to += pad_)
-      if (row >= 0 && row < rows_)
-        std::copy_n(&from(row * columns_, k), columns_, to);
+void FilteredSheet<S>::read_row(SheetForward<S>& out, int i, Index row) {
+  const Index first = row * columns_;
+  const bool whole = first + stride_ + 2 <= points_.size();
+  out.apart[i] = whole ? points_.size() : pad_;
+  const auto place = [&](const Points<S>& from, Lines<S>& last) -> const S* {
+    if (whole) return &from(first, 0);
+    S* to = last.data() + row % 3 * 3 * pad_;
+    for (int k = 0; k < 3; ++k)
+      if (row < rows_)
+        std::copy_n(&from(first, k), columns_, to + k * pad_);
       else
-        std::fill_n(to, columns_, S(0));
+        std::fill_n(to + k * pad_, columns_, S(0));
+    return to;
   };
-  fetch(points_.position, position_of(row));
-  if (damped_) fetch(predicted_, velocity_of(row));
+  out.x[i] = place(points_.position, last_x_);
+  out.v[i] = damped_ ? place(predicted_, last_v_) : nullptr;
 }
 
 // Masses on top of the filter's weigh, too.
@@ -311,8 +266,7 @@ template <class S>
 void FilteredSheet<S>::forward(double h) {
   ++evaluations_;
   std::fill(special_sums_.begin(), special_sums_.end(), S(0));
-  std::fill_n(pulls_.data(), 12 * pad_, S(0));
-  for (Index r = -2; r < 2; ++r) fetch_row(r);
+  std::fill_n(waiting_.data(), 12 * pad_, S(0));
   S* zeros = row_of(padded_rows_);
   SheetForward<S> row{};
   row.columns = int(stride_), row.pad = pad_, row.plane = plane_;
@@ -320,16 +274,11 @@ void FilteredSheet<S>::forward(double h) {
   row.extra = extra_on_ ? extra_row_.data() : nullptr;
   for (int k = 0; k < 3; ++k) row.gravity[k] = S(tick_.gravity[k]);
   for (Index r = 0; r < rows_; ++r) {
-    fetch_row(r + 2);
     weigh_row(r, h);
-    for (Index j = 0; j < 3; ++j) {
-      row.x[j] = position_of(r + j);
-      row.v[j] = damped_ ? velocity_of(r + j) : nullptr;
-    }
-    row.above = position_of(r - 1), row.above2 = position_of(r - 2);
-    row.pull = pulls_of(r), row.pull1 = pulls_of(r - 1), row.pull2 = pulls_of(r - 2);
-    row.stiffness = stiffness_row_[std::size_t(r)], row.rest = rest_row_[std::size_t(r)];
-    row.damping = damping_row_[std::size_t(r)];
+    for (int i = 0; i < 3; ++i) read_row(row, i, r + i);
+    row.near = waiting(r, 0), row.far = waiting(r, 1);
+    row.next_near = waiting(r + 1, 0), row.next_far = waiting(r + 1, 1);
+    row.springs = springs_.data() + r * (stride_ / kLanes<S>);
     const bool held = held_row_[std::size_t(r)];
     row.scale = held ? zero_row_.data() : scale_row_.data();
     row.mass = held ? zero_row_.data() : mass_row_.data();
@@ -337,7 +286,9 @@ void FilteredSheet<S>::forward(double h) {
       std::copy_n(&extra_(r * columns_, k), columns_, extra_row_.data() + k * pad_);
     row.z = row_of(r), row.z1 = r > 0 ? row_of(r - 1) : zeros, row.z2 = r > 1 ? row_of(r - 2) : zeros;
     row.w1 = column_line_.below[r], row.w2 = column_line_.below2[r];
+    row.far_from_rest = far_from_rest_[std::size_t(r)];
     sheet_forward(row);
+    far_from_rest_[std::size_t(r)] = row.far_from_rest;
     if (specials_.empty()) continue;
     add_odd(r, h);
     for (std::size_t i = 0; i < special_rows_.size(); ++i) {

@@ -29,6 +29,7 @@ struct SheetPlan {
   struct LineStiffness {
     double x = 0, y = 0;  // [1/s²]
   };
+  LineStiffness undamped;  ///< line_stiffness(0)
   LineStiffness line_stiffness(double h) const;
   double extension_under_weight(const Values<double>& mass) const;
   double travel(double h) const;
@@ -93,7 +94,7 @@ class FilteredSheet final : public PointBody<S> {
   void gather_extra(double t, double h);
   void forward(double h);
   void weigh_row(Index row, double h);
-  void fetch_row(Index row);
+  void read_row(SheetForward<S>& out, int i, Index row);
   void add_odd(Index row, double h);
   void solve_specials(double kick);
   void back(double kick, double drift);
@@ -103,17 +104,15 @@ class FilteredSheet final : public PointBody<S> {
   double followed(Index row, Index column, int k) const;
   bool needs_velocity() const { return damped_ || this->uses_velocity(); }
   S* row_of(Index row) { return z_.data() + row * stride_; }
-  // Of rows -2 and up, five of which are there at once; three for what springs wait with.
-  S* position_of(Index row) { return near_x_.data() + (row + 5) % 5 * 3 * pad_ + kMargin; }
-  S* velocity_of(Index row) { return near_v_.data() + (row + 5) % 5 * 3 * pad_ + kMargin; }
-  S* pulls_of(Index row) { return pulls_.data() + (row + 3) % 3 * 4 * pad_ + kMargin; }
+  // Forces on row + further from the rows before it: of two rows at once.
+  S* waiting(Index row, int further) { return waiting_.data() + (row % 2 * 2 + further) * 3 * pad_; }
 
   SheetPlan plan_;
   SpringField<S> field_;                // for energy and bounds
   bool damped_ = false, even_ = false;  // even: no mass differs
   Index rows_, columns_, stride_, padded_rows_, plane_, pad_;
-  Lines<S> stiffness_, rest_, damping_;  // rows of vectors of six directions; rest_: L, then L²
-  std::vector<const S*> stiffness_row_, rest_row_, damping_row_;
+  Lines<S> stiffness_, rest_, inverse_, damping_;
+  std::vector<SheetSprings<S>> springs_;  // by row and block of columns
 
   // Of the present step, pins and contacts.
   bool stale_ = true;  // pins have changed
@@ -137,8 +136,10 @@ class FilteredSheet final : public PointBody<S> {
   bool known_ = false;  // z_ is the kick of the coming tick's start
   Vec3 known_gravity_{0, 0, 0};
   bool extra_on_ = false, jumps_ = false;
-  Lines<S> z_;                        // kicks: three planes of rows, then a row of zeros
-  Lines<S> near_x_, near_v_, pulls_;  // of the rows around the present one, with margins
+  Lines<S> z_;                       // kicks: three planes of rows, then a row of zeros
+  Lines<S> last_x_, last_v_;         // of the last rows, with margins
+  Lines<S> waiting_;                 // forces on rows to come
+  std::vector<char> far_from_rest_;  // by row: whether springs were, when it was last looked at
   Lines<S> scale_row_, mass_row_, extra_row_, zero_row_, right_, wait_, add_, block_;
   Points<S> extra_, predicted_, from_, touched_x_, touched_v_;
   Points<S> place_x_, place_v_, pin_velocity_, jump_;  // where there are moving pins; only their rows count

@@ -8,6 +8,7 @@
 
 #include <hwy/highway.h>
 
+#include <hooke/softbody/near_rest.hpp>
 #include <hooke/types.hpp>
 
 HWY_BEFORE_NAMESPACE();
@@ -15,39 +16,26 @@ namespace hooke::softbody::HWY_NAMESPACE {
 
 namespace hn = hwy::HWY_NAMESPACE;
 
-// Below this length [m], squared, a spring has no direction.
-constexpr double kTiny = 1e-24;
-
 template <class D, class V = hn::Vec<D>>
 HWY_INLINE V squared_length(D d, V x, V y, V z) {
   return hn::MulAdd(z, z, hn::MulAdd(y, y, hn::MulAdd(x, x, hn::Set(d, hn::TFromD<D>(kTiny)))));
 }
 
-// Springs whose squared length is off by at most this share of its square at rest take a series.
-template <class S>
-constexpr S kNear = S(sizeof(S) == 4 ? 0.125 : 0.085);
-
-// Force over length, k (1 - 1/sqrt(1 + e)), of n springs with |e| <= kNear, e = l²/L² - 1, to a unit of the last place.
-// A series, no root and no quotient: a processor does many multiplications at once. Exactly zero where e is. The
-// springs take each step together, or it would wait for the one before. Stiffnesses are `apart` from each other.
-//
-// In float e g(e) with g by Chebyshev's interpolation, which keeps what is small as exact as what is not. In double a
-// cubic, y = 1/sqrt(1 + e) to 4e-6, exact at and around e = 0, and one step of third order from there:
-// y (1 + r + 3/2 r²), r = (1 - (1 + e) y²)/2. A series of that precision would have eleven terms.
+// Force over length, k (1 - 1/sqrt(1 + e)), of n springs near their rest lengths, see NearRest. They take each step
+// together, or a processor would wait for the one before. Stiffnesses are `apart` from each other.
 template <std::size_t n, class D, class V = hn::Vec<D>>
 HWY_INLINE void near_rest(D d, const V (&e)[n], const hn::TFromD<D>* stiffness, int apart, V (&out)[n]) {
   using S = hn::TFromD<D>;
+  constexpr auto& c = NearRest<S>::c;
   const auto each = [&](const auto& action) HWY_ATTR {
     for (std::size_t j = 0; j < n; ++j) action(j);
   };
   const auto k = [&](std::size_t j) HWY_ATTR { return hn::Load(d, stiffness + int(j) * apart); };
   if constexpr (sizeof(S) == 4) {
-    static constexpr S c[] = {0.500000025f, -0.375000024f, 0.312470649f, -0.273409976f, 0.251080795f, -0.230262271f};
     each([&](auto j) HWY_ATTR { out[j] = hn::MulAdd(e[j], hn::Set(d, c[5]), hn::Set(d, c[4])); });
     for (int i = 3; i >= 0; --i) each([&](auto j) HWY_ATTR { out[j] = hn::MulAdd(out[j], e[j], hn::Set(d, c[i])); });
     each([&](auto j) HWY_ATTR { out[j] = hn::Mul(hn::Mul(k(j), e[j]), out[j]); });
   } else {
-    static constexpr S c[] = {1, -0.5, 0.3769874362125975, -0.314289032358835};
     const auto half = hn::Set(d, S(0.5)), one = hn::Set(d, c[0]);
     V y[n], r[n];
     each([&](auto j) HWY_ATTR { y[j] = hn::MulAdd(e[j], hn::Set(d, c[3]), hn::Set(d, c[2])); });
