@@ -23,7 +23,7 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kStepSafety = 0.9;
 // Predicted errors times this must be below the wanted one, by order 2, by higher orders, where it costs few steps, and
 // by methods that damp.
-constexpr double kSafety = 2, kHighSafety = 4, kCoarseSafety = 3;
+constexpr double kSafety = 2, kHighSafety = 3, kCoarseSafety = 3;
 // Rounding in float moves points by this share of the size times √steps (measured on sheets, chains and boxes).
 constexpr double kFloatFloor = 1.2e-8;
 // Velocity Verlet at its limit is compared with so many times as many steps. The difference tells its error at order 2;
@@ -39,7 +39,7 @@ constexpr double kRoom = 1.3;
 // Errors grow as a power of time between these; measured ones beyond are not believed.
 constexpr double kLeastGrowth = 0.5, kMostGrowth = 2.5;
 // The power may be wrong by this.
-constexpr double kDoubt = 0.75;
+constexpr double kDoubt = 0.5;
 // Filtered leapfrog is for errors from this share of the size on; its trials may cost so much of velocity Verlet's run.
 constexpr double kFilteredFrom = 3e-4, kFilteredBudget = 0.35, kQuietBudget = 0.08;
 // Methods that are stable at any step are for errors from this share of the size on, and for at most this share of
