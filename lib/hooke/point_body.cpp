@@ -501,7 +501,8 @@ bool PointBody<S>::rounding_shows(double h, double speed, double size, double gr
 
 template <class S>
 bool PointBody<S>::needs_low() const {
-  if (!std::is_same_v<S, float> || !settings_.compensated) return false;
+  // Without fields there is nothing that would feel it.
+  if (!std::is_same_v<S, float> || !settings_.compensated || fields_.empty()) return false;
   const double h = (tick_.end - tick_.start) / double(substeps_);
   const bool stepped = fused() && fine_stepper_;
   if (stepped && settings_.dt > 0 && std::isfinite(checked_limit_) && h < kFine * checked_limit_) return true;
