@@ -108,9 +108,10 @@ SheetPlan::SheetPlan(std::shared_ptr<const SpringNetwork> given, const Points<do
   }
   step = dt;
   if (wanted_error > 0) {
-    // Error = B (1/s - 1) + 0.11 L (c √s h / L)^1.33 at the largest h: 1/s = 0.4 (E + B) / B.
+    // Both errors add up as squares: E² = (B (1/s - 1))² + (0.11 L (c √s h / L)^1.33)². The largest h of that is where
+    // 5/2 u² - 7/2 u + 1 = (E / B)², u = 1/s.
     const double extension = kCapFactor * extension_under_weight(mass);
-    const double softer = extension > 0 ? 0.4 * (wanted_error + extension) / extension : 1;
+    const double softer = extension > 0 ? 0.7 + 0.2 * std::sqrt(2.25 + 10 * std::pow(wanted_error / extension, 2)) : 1;
     if (softer > 1) {
       stiffness_scale = 1 / softer;
       cap_error = extension * (softer - 1);
@@ -118,7 +119,8 @@ SheetPlan::SheetPlan(std::shared_ptr<const SpringNetwork> given, const Points<do
       speed_x *= std::sqrt(stiffness_scale), speed_y *= std::sqrt(stiffness_scale);
       undamped.x *= stiffness_scale, undamped.y *= stiffness_scale;
     }
-    step = step_of_error(wanted_error - cap_error, length, fastest * std::sqrt(stiffness_scale));
+    step = step_of_error(std::sqrt(wanted_error * wanted_error - cap_error * cap_error), length,
+                         fastest * std::sqrt(stiffness_scale));
   } else if (dt == 0) {
     step = step_of_error(kDefaultError * length, length, fastest);
   }
@@ -183,7 +185,7 @@ double SheetPlan::travel(double h) const {
 
 double SheetPlan::expected_error(double h) const {
   const double length = width > 0 && (height == 0 || speed_x / width > speed_y / height) ? width : height;
-  return kErrorFactor * length * std::pow(travel(h), kErrorPower) + cap_error;
+  return std::hypot(kErrorFactor * length * std::pow(travel(h), kErrorPower), cap_error);
 }
 
 template <class S>
