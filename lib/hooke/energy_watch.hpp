@@ -18,9 +18,12 @@ class EnergyWatch {
   /// Something may have given energy; `start` again.
   void forget() { known_ = false; }
   /// @param total, kinetic energies [J] that it has now  @param rounding what of the total is noise [J]
-  void start(double total, double kinetic, double rounding) {
-    known_ = true, start_ = total, looked_at_ = kinetic, rounding_ = rounding;
+  /// @param kick the most that the rounding of one evaluation of the forces gives, on average [J]
+  void start(double total, double kinetic, double rounding, double kick) {
+    known_ = true, start_ = total, looked_at_ = kinetic, rounding_ = rounding, kick_ = kick;
   }
+  /// Kicks add up: undamped, they shake what was at rest.
+  void kicked(double times) { rounding_ += times * kick_; }
   /// True where `judge` must be asked.
   bool due(double kinetic) const { return known_ && kinetic > 2 * looked_at_ && kinetic > rounding_; }
   Finding judge(double total, double kinetic) {
@@ -35,7 +38,7 @@ class EnergyWatch {
  private:
   static constexpr double kGrows = 0.1;
   bool known_ = false;
-  double start_ = 0, looked_at_ = 0, rounding_ = 0;
+  double start_ = 0, looked_at_ = 0, rounding_ = 0, kick_ = 0;
 };
 
 }  // namespace hooke

@@ -396,7 +396,7 @@ int main(int argc, char** argv) {
     const double choosing_cpu = cpu_seconds() - begin;
     const Run ours = run(scene, *choice.method, choice.precision, double(choice.substeps));
     Outcome out;
-    out.error = rms(ours.end, answer) / error;
+    out.error = ours.good ? rms(ours.end, answer) / error : std::numeric_limits<double>::infinity();
     out.met = out.error <= 1;
     out.says_no = !choice.meets;
     // By the speed that it had; implicit methods as they were counted.

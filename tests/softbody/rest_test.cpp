@@ -229,6 +229,33 @@ TEST(AutomaticStep, KeepsTheEnergyOfWhatNothingDamps) {
   EXPECT_GT(least, (1 - 1e-3) * start);
 }
 
+// Rounding shakes it a little more with every substep: that is no blow-up.
+TEST(Rest, OfAnUndampedSheetIsNotTakenForEnergyFromNowhere) {
+  for (const Method* method : {&velocity_verlet(), &semi_implicit_euler()})
+    for (const Precision precision : {Precision::Float, Precision::Double}) {
+      SCOPED_TRACE(std::string(method->name) + (precision == Precision::Float ? ", float" : ", double"));
+      SoftBodySettings settings = test::sheet(12);
+      settings.precision = precision;
+      settings.motion.method = method;
+      settings.motion.compensated = false;
+      settings.positions *= 1.1;  // in numbers that are not round
+      auto network = std::make_shared<SpringNetwork>(*settings.network);
+      for (Spring& spring : network->springs)
+        spring.rest_length = (settings.positions.row(spring.a) - settings.positions.row(spring.b)).matrix().norm();
+      settings.network = network;
+      const double stable = make_soft_body(settings)->stable_step(*method);
+      settings.motion.dt = 0.9 * stable;
+      World world(1 / (500 * stable));
+      world.enable_gravity(false);
+      Body& body = world.add(make_soft_body(settings));
+      for (int tick = 0; tick < 200; ++tick) {
+        const StepReport report = world.update(world.clock().tick());
+        ASSERT_TRUE(report.good()) << report.text();
+      }
+      EXPECT_GT(rms_speed(body), 0);
+    }
+}
+
 // A block on a slope that friction holds does not creep.
 TEST(Rest, HoldsOnASlopeUnderEverySolver) {
   for (const Method* method : {&velocity_verlet(), &xpbd(), &implicit_euler()}) {
