@@ -615,6 +615,22 @@ void PointBody<S>::follow() {
   known_reach_ = 2 * step;
 }
 
+// What is found out before a tick, all of the same positions: bounds of rates are worked out once.
+template <class S>
+void PointBody<S>::begin_tick(const Tick& tick) {
+  struct OneState {
+    PointBody& body;
+    explicit OneState(PointBody& b) : body(b) { body.before_tick_ = true; }
+    ~OneState() { body.before_tick_ = false, body.rates_.reset(); }
+  } one_state(*this);
+  choose_substeps(tick);
+  spend_bank(tick.end - tick.start);
+  hold_fields(tick.start);
+  bound_swing(tick);
+  check_step();
+  begin_energy_watch();
+}
+
 template <class S>
 StepReport PointBody<S>::advance(const Tick& tick) {
   if (asleep_ && !disturbed(tick)) return {};
@@ -626,16 +642,7 @@ StepReport PointBody<S>::advance(const Tick& tick) {
   if (size() == 0) return {};
   if (tick.gravity != last_gravity_) energy_watch_.forget();
   last_gravity_ = tick.gravity;
-  before_tick_ = true;
-  rates_.reset();
-  choose_substeps(tick);
-  spend_bank(tick.end - tick.start);
-  hold_fields(tick.start);
-  bound_swing(tick);
-  check_step();
-  begin_energy_watch();
-  before_tick_ = false;
-  rates_.reset();
+  begin_tick(tick);
   StepReport report = try_tick();
   for (int retry = 0; retry < settings_.retries && !report.good() && substeps_ < settings_.max_substeps; ++retry) {
     substeps_ = std::min(2 * substeps_, settings_.max_substeps);

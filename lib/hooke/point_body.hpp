@@ -174,6 +174,7 @@ class PointBody : public Body, protected Dynamics<S> {
   void choose_substeps(const Tick& tick);
   void bound_swing(const Tick& tick);
   void follow();
+  void begin_tick(const Tick& tick);
   void spend_bank(double seconds);
   void hold_fields(double t);
   void hold(Index point);

@@ -28,8 +28,9 @@ struct FilteredFacts {
   double wave_speed = 0;       ///< c [m/s], of stretching waves, in the faster direction
   double travel = 0;           ///< c h / L, the larger of both directions; above 0.8 the motion freezes
   double stiffness_scale = 1;  ///< of all springs; below 1 where a wanted error allowed to lower it
-  double expected_error = 0;   ///< [m] RMS after a free fall under its weight: 0.11 L (c h / L)^1.33, plus the cap's
-  bool filtered = false;       ///< false: plain leapfrog, the step is small enough
+  double expected_error =
+      0;  ///< [m] RMS after a free fall under its weight: 0.11 L (c h / L)^1.33, and the cap's, added as squares
+  bool filtered = false;  ///< false: plain leapfrog, the step is small enough
 
   static constexpr double kFreeze = 0.8;  ///< travel from which a step is too large
   bool freezes() const { return travel > kFreeze; }

@@ -407,7 +407,7 @@ HWY_EXPORT(squares_double);
 // Grids of more bytes than this leave a core's own caches: stages then run down the rows together.
 constexpr std::size_t kCacheBytes = std::size_t(2) << 20;
 constexpr std::size_t kTogether = 4;
-// Bands of fewer points do not pay for their edges.
+// Bands of fewer points do not pay for waiting for each other.
 constexpr Index kBandPoints = 1500, kBandRows = 8;
 
 // O is the body's scalar, S the kernel's. A body in double that is stepped in float has two of them a value; one in
@@ -447,6 +447,7 @@ class GridStepper final : public Stepper<O> {
         to_blocks(v, r, fields, 4 + k, state_.motion, rest);
       }
       to_blocks(&points.inverse_mass[r * columns_], r, fields, 3, state_.motion, [](O value) { return S(value); });
+      clear_padding(r);
     }
     if constexpr (kWide) add_low(low);
   }
@@ -498,6 +499,15 @@ class GridStepper final : public Stepper<O> {
   static constexpr bool kLow = sizeof(O) > sizeof(S), kWide = sizeof(O) < sizeof(S);
   static constexpr S kRounding =
       kWide ? S(std::numeric_limits<O>::epsilon()) : std::numeric_limits<S>::epsilon();  // of places
+
+  // Columns behind the last one are stepped, too: what a blow-up has left there would never go away.
+  void clear_padding(Index r) {
+    const Index end = state_.blocks * kBlock;
+    for (int k = 0; k < state_.planes(); ++k)
+      std::fill(state_.position(r) + k * state_.stride + columns_, state_.position(r) + k * state_.stride + end, S(0));
+    for (int field = 0; field < state_.fields(); ++field)
+      for (Index c = columns_; c < end; ++c) state_.motion[at(r, c, state_.fields(), field)] = S(0);
+  }
 
   void add_low(const LowParts<O>& low) {
     for (Index r = 0; r < state_.rows && low.position.rows() > 0; ++r)

@@ -15,8 +15,8 @@ namespace hooke::softbody {
 /// with the point it starts at, and what it pulls at further on waits in a sum: to the right in registers, below in
 /// two rows of sums. With e = l²/L² - 1, a spring's force over length is k (1 - 1/√(1 + e)): a series in e, to a unit
 /// of its last place, where |e| is small, and a root and a quotient for the few that are not. L² comes from the same
-/// operations as l²: exactly nothing at rest. Every operation is an IEEE one and stays in its column, so instruction
-/// sets with fused multiply-add agree in every bit, and so do those without.
+/// operations as l²: exactly nothing at rest. Every operation is an IEEE one, in an order that no vector's length
+/// changes, so instruction sets with fused multiply-add agree in every bit, and so do those without.
 ///
 /// Where the grid outgrows the caches, several stages follow each other down the rows at once.
 ///
