@@ -208,7 +208,7 @@ RandomScene make_scene(unsigned seed, double work) {
     SoftBodySettings probe = s.body;
     probe.precision = Precision::Double;
     const double h = 0.9 * make_soft_body(probe)->stable_step(velocity_verlet());
-    const double seconds = modelled_seconds(s.body, velocity_verlet(), Precision::Float, s.duration / h);
+    const double seconds = SolverCost(s.body).seconds(velocity_verlet(), Precision::Float, s.duration / h);
     const double scale = std::clamp(target / seconds, 0.1, 100.0);
     if (pass == 0)
       for (Spring& sp : net.springs) sp.stiffness *= scale * scale, sp.damping *= scale;
@@ -287,12 +287,13 @@ std::vector<Row> rows_of(const RandomScene& scene, double speed) {
   settings.precision = Precision::Double;
   const auto body = make_soft_body(settings);
   const bool velocity = body->motion_facts().velocity_forces;
+  const SolverCost cost(scene.body);
   std::vector<Row> out;
   const auto add = [&](const Method& method, double n) {
     for (const Precision p : {Precision::Float, Precision::Double})
       out.push_back({&method, p, n,
-                     modelled_seconds(scene.body, method, p, evaluations_of(method, scene.ticks, n),
-                                      rounding_shows(scene.body, tick / n, speed, scene.gravity.norm()))});
+                     cost.seconds(method, p, evaluations_of(method, scene.ticks, n),
+                                  rounding_shows(scene.body, tick / n, speed, scene.gravity.norm()))});
   };
   double fewest = 1;
   for (const Method* method :
@@ -403,8 +404,9 @@ int main(int argc, char** argv) {
     const double cost_of_choice =
         choice.method == &implicit_euler()
             ? choice.seconds
-            : modelled_seconds(scene.body, *choice.method, choice.precision, choice.evaluations,
-                               rounding_shows(scene.body, choice.dt, ours.speed, scene.gravity.norm()));
+            : SolverCost(scene.body)
+                  .seconds(*choice.method, choice.precision, choice.evaluations,
+                           rounding_shows(scene.body, choice.dt, ours.speed, scene.gravity.norm()));
     // The cheapest row that meets it. Rows dearer than ours are not looked at: ours then counts as the cheapest.
     std::map<std::pair<const Method*, Precision>, double> coarser;
     Row best{choice.method, choice.precision, double(choice.substeps), cost_of_choice};

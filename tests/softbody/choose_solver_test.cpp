@@ -167,7 +167,7 @@ TEST(Chooser, TakesDoubleWhereFloatWouldBeSteppedInDouble) {
   EXPECT_EQ(soft.precision, Precision::Float) << soft.text();
   EXPECT_FALSE(rounding_shows(body, soft.dt, speed, 9.81));
   const auto seconds = [&](Precision precision, bool in_double) {
-    return modelled_seconds(body, velocity_verlet(), precision, 1000, in_double);
+    return SolverCost(body).seconds(velocity_verlet(), precision, 1000, in_double);
   };
   EXPECT_LT(seconds(Precision::Float, false), seconds(Precision::Double, false));
   EXPECT_EQ(seconds(Precision::Float, true), seconds(Precision::Double, true));

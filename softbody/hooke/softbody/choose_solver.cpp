@@ -1,10 +1,7 @@
 #include <hooke/softbody/choose_solver.hpp>
 
-#include <hooke/block_cholesky.hpp>
 #include <hooke/error.hpp>
-#include <hooke/point_body.hpp>
 #include <hooke/softbody/filtered_grid.hpp>
-#include <hooke/softbody/grid_order.hpp>
 #include <hooke/world.hpp>
 
 #include <algorithm>
@@ -78,43 +75,7 @@ double size_of(const Points<double>& x) {
   return x.rows() ? std::sqrt((x.colwise().maxCoeff() - x.colwise().minCoeff()).square().sum()) : 0;
 }
 
-bool is_grid(const SoftBodySettings& s) {
-  if (!s.network || s.network->springs.empty()) return false;
-  try {
-    const SpringGrid grid = SpringGrid::of(*s.network, s.positions.rows());
-    return grid.rows > 1 && grid.columns > 1;
-  } catch (const std::invalid_argument&) {
-    return false;
-  }
-}
-
-// What the fused kernels take for it.
-const CostTable& fused_cost(const SoftBodySettings& s) {
-  if (!s.network) return kNetworkCost;
-  return is_grid(s) || !grid_order(*s.network, s.positions).empty() ? kGridCost : kNetworkCost;
-}
-
-// Whether the fused kernels can run it.
-bool springs_alone(const SoftBodySettings& s) {
-  if (s.linear_drag != 0 || s.quadratic_drag != 0 || (s.wind && !s.wind->once_a_tick)) return false;
-  return !s.network || std::none_of(s.network->springs.begin(), s.network->springs.end(),
-                                    [](const Spring& spring) { return spring.damping > 0; });
-}
-
 bool is_implicit(const Method& method) { return &method != &xpbd() && std::holds_alternative<Implicit>(method.scheme); }
-
-double seconds_of(const SoftBodySettings& settings, const CostTable& fused_cost, const Method& method,
-                  Precision precision, double evaluations, bool in_double) {
-  const bool fused = springs_alone(settings) && std::holds_alternative<Splitting>(method.scheme);
-  const CostTable& table = &method == &filtered_leapfrog() ? kFilteredCost
-                           : &method == &xpbd()            ? kXpbdCost
-                           : fused                         ? fused_cost
-                                                           : kDampedCost;
-  const double springs = settings.network ? double(settings.network->springs.size()) : 0;
-  const bool stepped = &table == &fused_cost;
-  const bool single = precision == Precision::Float && !(stepped && in_double);
-  return 1e-9 * (single ? table.single : table.twice) * (springs + double(settings.positions.rows())) * evaluations;
-}
 
 void check(const SoftBodySettings& settings, const RunSetting& run) {
   const auto positive = [&](double value, const char* what) {
@@ -196,7 +157,7 @@ struct Forecast {
 class Chooser {
  public:
   Chooser(const SoftBodySettings& settings, const RunSetting& run, double wanted_error)
-      : settings_(settings), run_(run), ticks_(ticks_of(run)), fused_cost_(fused_cost(settings)) {
+      : settings_(settings), run_(run), ticks_(ticks_of(run)), cost_(settings) {
     settings_.motion.dt = 0;
     settings_.wanted_error = 0;
     settings_.motion.method = &velocity_verlet();
@@ -257,7 +218,7 @@ class Chooser {
     out.substeps = steps;
     out.evaluations = evaluations_of(method, double(ticks_), double(steps));
     const bool in_double = rounding_shows(settings_, tick_ / double(steps), speed_, run_.gravity.norm(), limit(method));
-    out.seconds = seconds_of(settings_, fused_cost_, method, precision, out.evaluations, in_double);
+    out.seconds = cost_.seconds(method, precision, out.evaluations, in_double);
     return out;
   }
 
@@ -302,7 +263,6 @@ class Chooser {
 
   // Filtered leapfrog over the whole run from coarse steps on: its trials are cheap beside velocity Verlet.
   bool filtered_leapfrog_does() {
-    if (!is_grid(settings_)) return false;
     // For small errors only sheets that hardly move are worth a look.
     const bool quiet = wanted_ < kFilteredFrom * choice_.size;
     const Method& method = filtered_leapfrog();
@@ -641,7 +601,7 @@ class Chooser {
   Index ticks_, stride_ = 1;
   double speed_ = 0;  // RMS over points and time [m/s], as far as it is known
   double tick_ = 0, wanted_ = 0;
-  const CostTable& fused_cost_;
+  const SolverCost cost_;
   std::vector<Limit> limits_;
   std::optional<ImplicitCost> implicit_cost_;
   const Method *high_ = nullptr, *highest_ = nullptr;  // of order 4 and, where there is one, 6
@@ -654,48 +614,6 @@ class Chooser {
 };
 
 }  // namespace
-
-bool rounding_shows(const SoftBodySettings& settings, double h, double speed, double gravity, double stable_step) {
-  if (!settings.motion.compensated) return false;
-  if (std::isfinite(stable_step) && h < PointBody<float>::kFine * stable_step) return true;
-  const double size = settings.positions.rows() ? settings.positions.abs().maxCoeff() : 0;
-  return PointBody<float>::rounding_shows(h, speed, size, gravity);
-}
-
-double modelled_seconds(const SoftBodySettings& settings, const Method& method, Precision precision, double evaluations,
-                        bool in_double) {
-  return seconds_of(settings, fused_cost(settings), method, precision, evaluations, in_double);
-}
-
-ImplicitCost::ImplicitCost(const SoftBodySettings& settings) {
-  const Index points = settings.positions.rows();
-  std::vector<Coupling> couplings;
-  if (settings.network)
-    for (const Spring& spring : settings.network->springs) couplings.push_back({spring.a, spring.b, Mat3::Zero()});
-  springs_and_points_ = double(points) + double(couplings.size());
-  BlockCholesky factors;
-  factors.analyse(points, couplings);
-  if (!std::isfinite(factors.cost())) return;
-  factoring_ = factors.cost();
-  // 18 a block of the factors, of which there are about so many.
-  solving_ = 18 * std::sqrt(2 * factors.cost() * double(points) / 27);
-}
-
-double ImplicitCost::seconds(Precision precision, double evaluations, double products, double steps) const {
-  const bool single = precision == Precision::Float;
-  const double evaluation = springs_and_points_ * (single ? kDampedCost.single : kDampedCost.twice),
-               product = springs_and_points_ * (single ? kProductCost.single : kProductCost.twice);
-  const double refactoring = factoring_ > 0 ? product : 0;
-  return 1e-9 * (evaluation * evaluations + (product + solving_ + refactoring) * products + factoring_ * steps);
-}
-
-double evaluations_of(const Method& method, double ticks, double substeps) {
-  if (&method == &xpbd()) return ticks * substeps * kXpbdIterations;
-  // What ends with a kick evaluates once more at a tick's end.
-  const auto* table = std::get_if<Splitting>(&method.scheme);
-  const bool kick_last = table && &method != &filtered_leapfrog() && table->drift.back() == 0;
-  return ticks * (substeps * method.evaluations + (kick_last ? 1 : 0));
-}
 
 void SolverChoice::apply(SoftBodySettings& settings) const {
   settings.motion.method = method;
@@ -751,13 +669,14 @@ Verification verify(const SoftBodySettings& settings, const RunSetting& run) {
   const Method& method = body->motion_facts().velocity_forces ? rk4() : blanes_moan_6();
   const double stable = kStepSafety * body->stable_step(method);
   double steps = std::isfinite(stable) ? std::max(1.0, std::ceil(1 / run.tick_rate / stable)) : 1;
+  const SolverCost cost(settings);
   const Points<double> ours = end_of(settings);
   Points<double> before;
   s.motion.method = &method;
   for (int level = 0; level < 7; ++level, steps *= 2) {
     s.motion.dt = 1 / run.tick_rate / steps;
     const Points<double> now = end_of(s);
-    out.seconds += modelled_seconds(s, method, Precision::Double, evaluations_of(method, double(ticks), steps));
+    out.seconds += cost.seconds(method, Precision::Double, evaluations_of(method, double(ticks), steps));
     out.error = rms(ours, now);
     out.uncertainty = level > 0 ? rms(now, before) : kInfinity;
     out.reference = std::string(method.name) + format(", double, %g steps a tick", steps);
