@@ -55,6 +55,38 @@ SoftBodySettings stiff_chain(double stiffness, double damping) {
   return s;
 }
 
+// A box of n × n × n points, 1 m wide, that hangs from its upper face; pulled longer at the start by a share.
+SoftBodySettings box(int n, double stiffness, double stretch, double damping = 0) {
+  SoftBodySettings s;
+  s.positions.resize(n * n * n, 3);
+  SpringNetwork net;
+  const double d = 1.0 / (n - 1);
+  const auto at = [&](int i, int j, int k) { return (k * n + j) * n + i; };
+  for (int k = 0; k < n; ++k)
+    for (int j = 0; j < n; ++j)
+      for (int i = 0; i < n; ++i) s.positions.row(at(i, j, k)) << d * i, -d * k, d * j;
+  const auto join = [&](int a, int b) {
+    Spring spring;
+    spring.a = a, spring.b = b, spring.stiffness = stiffness, spring.damping = damping;
+    spring.rest_length = (s.positions.row(a) - s.positions.row(b)).matrix().norm();
+    net.springs.push_back(spring);
+  };
+  for (int k = 0; k < n; ++k)
+    for (int j = 0; j < n; ++j)
+      for (int i = 0; i < n; ++i) {
+        if (i + 1 < n) join(at(i, j, k), at(i + 1, j, k));
+        if (j + 1 < n) join(at(i, j, k), at(i, j + 1, k));
+        if (k + 1 < n) join(at(i, j, k), at(i, j, k + 1));
+        if (i + 1 < n && k + 1 < n) join(at(i, j, k), at(i + 1, j, k + 1)), join(at(i + 1, j, k), at(i, j, k + 1));
+        if (j + 1 < n && k + 1 < n) join(at(i, j, k), at(i, j + 1, k + 1)), join(at(i, j + 1, k), at(i, j, k + 1));
+      }
+  s.positions.col(1) *= 1 + stretch;
+  s.masses = Values<double>::Constant(n * n * n, 1.0 / (n * n * n));
+  s.network = std::make_shared<SpringNetwork>(net);
+  for (int i = 0; i < n * n; ++i) s.pins.push_back(i);
+  return s;
+}
+
 // Of 60 ticks a second, a quarter of one.
 RunSetting coarse_ticks() {
   RunSetting run;
@@ -153,6 +185,58 @@ TEST(Chooser, TakesXpbdWhereSpringsAreVeryStiff) {
   // Softer springs or smaller errors are not for it.
   EXPECT_EQ(choose_solver(stiff_chain(1e4, 0), coarse_ticks(), 3e-2).method, &velocity_verlet());
   EXPECT_NE(choose_solver(body, coarse_ticks(), 1e-6).method, &xpbd());
+}
+
+TEST(Chooser, TakesXpbdForABodyNearRest) {
+  // It sags by a millionth, and with a few sweeps by far more: the bound of that is what counts.
+  for (const double wanted : {1e-2, 1e-3}) {
+    const SoftBodySettings body = box(6, 3e6, 0);
+    const SolverChoice choice = choose_solver(body, coarse_ticks(), wanted);
+    EXPECT_EQ(choice.method, &xpbd()) << choice.text();
+    EXPECT_THAT(choice.reason, ::testing::HasSubstr("the body stays within"));
+    // Trials included it costs a fraction of velocity Verlet at its limit.
+    const double step = make_soft_body(body)->stable_step(velocity_verlet());
+    const double verlet =
+        SolverCost(body).seconds(velocity_verlet(), Precision::Double, coarse_ticks().duration / step);
+    EXPECT_LT(choice.pilot_seconds + choice.seconds, 0.25 * verlet) << choice.text();
+    SoftBodySettings chosen = body;
+    choice.apply(chosen);
+    const Verification truth = verify(chosen, coarse_ticks());
+    EXPECT_TRUE(truth.converged());
+    EXPECT_LE(truth.error, choice.wanted_error) << choice.text();
+  }
+  // Pulled longer it swings by as much as the wanted error: sweeps that damp that are not for it.
+  EXPECT_NE(choose_solver(box(6, 3e6, 0.02), coarse_ticks(), 1e-3).method, &xpbd());
+}
+
+TEST(Chooser, ForetellsTheErrorOfRoughMotion) {
+  // Let go at once from a stretch, half the motion is in modes that the largest stable step does not resolve. Both runs
+  // of the pair lose their phases: their difference is the error, and grows slower than time.
+  const SoftBodySettings body = box(6, 1e4, 0.01);
+  const RunSetting run = coarse_ticks();
+  const SolverChoice choice = choose_solver(body, run, 5e-3);
+  ASSERT_EQ(choice.method, &velocity_verlet()) << choice.text();
+  SoftBodySettings chosen = body;
+  choice.apply(chosen);
+  const Verification truth = verify(chosen, run);
+  EXPECT_TRUE(truth.converged());
+  EXPECT_GT(choice.predicted_error, truth.error / 1.5) << choice.text();
+  EXPECT_LT(choice.predicted_error, truth.error * 2) << choice.text();
+  // As its growth is known, it shows early.
+  EXPECT_LT(choice.pilot_seconds, 0.4 * choice.seconds) << choice.text();
+}
+
+TEST(Chooser, DoesNotLetErrorsOfHighOrdersGrowWhereDampersTakeThem) {
+  const SoftBodySettings body = box(6, 1e4, 0.02, 0.05);
+  const SolverChoice choice = choose_solver(body, half_a_second(), 1e-6);
+  ASSERT_EQ(choice.method, &rk4()) << choice.text();
+  SoftBodySettings chosen = body;
+  choice.apply(chosen);
+  const Verification truth = verify(chosen, half_a_second());
+  EXPECT_TRUE(truth.converged());
+  EXPECT_LE(truth.error, choice.wanted_error) << choice.text();
+  // And not at many times the steps that it takes.
+  EXPECT_GE(truth.error, 0.05 * choice.wanted_error) << choice.text();
 }
 
 TEST(Chooser, TakesDoubleWhereFloatWouldBeSteppedInDouble) {

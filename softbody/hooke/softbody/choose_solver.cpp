@@ -18,25 +18,46 @@ namespace {
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 // Steps are kept at this share of the largest stable one.
 constexpr double kStepSafety = 0.9;
-// Predicted errors times this must be below the wanted one, by order 2, by higher orders, where it costs few steps, and
-// by methods that damp.
-constexpr double kSafety = 2, kHighSafety = 3, kCoarseSafety = 3;
+// Predicted errors times this must be below the wanted one: by order 2, where the motion is calm and smooth, calm and
+// rough; by higher orders; and by methods that damp.
+constexpr double kSafety = 2, kCalmSafety = 1.3, kRoughSafety = 1.4, kHighSafety = 1.5, kCoarseSafety = 3;
 // Rounding in float moves points by this share of the size times √steps (measured on sheets, chains and boxes).
 constexpr double kFloatFloor = 1.2e-8;
-// Velocity Verlet at its limit is compared with so many times as many steps. The difference tells its error at order 2;
-// where motion is rough it is more, so this times as much is taken.
-constexpr double kPairSteps = 1.5, kPairRough = 1.1;
+// So many times that in a chain, which has no neighbours that even out its rounding; where dampers take it away; and
+// where float is stepped in double, so that little but the rounding of the start remains.
+constexpr double kChainFloor = 10, kDampedFloor = 0.4, kFineFloor = 0.5;
+// Velocity Verlet at its limit is compared with so many times as many steps. The difference tells its error at order 2.
+constexpr double kPairSteps = 1.5;
+// Motion is rough where that difference is more than this share of it: part of it lies in modes that the limit's step
+// does not resolve. Then both runs are as wrong as each other, and the error is so many times the difference.
+constexpr double kRough = 0.03, kRoughPair = 1.25;
+// Motion is calm where it has turned, that is, its second half takes the points not much farther than the first one,
+// and where it is a small share of the size.
+constexpr double kCalmMore = 1.5, kCalmMost = 0.1;
 // Where it is not enough its growth is followed over the first share of the run at least, and errors of higher orders
 // are judged over the second.
 constexpr double kPairShare = 1.0 / 8, kJudgedShare = 1.0 / 16;
 // The judge may find so many times the error that the pair tells: at order 0.5.
 constexpr double kMostJudged = 3;
+// At the limit order 4 errs so much less than order 2, where motion is smooth and where it is anything.
+constexpr double kHighBetter = 16, kHighBetterSmooth = 100;
+// Orders that show at least where motion is rough, of the methods of order 4 and 6, and that of RK4 with dampers.
+constexpr double kRoughHigh = 2.2, kRoughHighest = 2.5, kDampedHigh = 3.7, kDampedRoughHigh = 3;
 // What rounding alone may take must be so much less than the wanted error.
 constexpr double kRoom = 1.3;
-// Errors grow as a power of time between these; measured ones beyond are not believed.
-constexpr double kLeastGrowth = 0.5, kMostGrowth = 2.5;
-// The power may be wrong by this.
-constexpr double kDoubt = 0.5;
+// Errors grow as a power of time; measured ones beyond these bounds are not believed, and may be wrong by the last
+// figure. Phases drift as time goes, so errors of a motion that has turned grow not much faster than that, and those of
+// one that still grows by so much more than its displacement does.
+constexpr double kLeastGrowth = 0.5, kMostGrowth = 2.5, kDoubt = 0.5, kCalmDoubt = 0.2;
+constexpr double kLeastSmooth = 0.6, kDriftGrowth = 1.1;
+// Modes that are not resolved have lost their phases already.
+constexpr double kLeastRough = 0.25, kMostRough = 0.6;
+// Rounding is seen to begin slower than it goes on.
+constexpr double kLeastRounding = 0.75;
+// What dampers take from errors goes as this power at the most.
+constexpr double kMostFading = 1;
+// Errors of higher orders sit in the fastest modes: in motion without dampers they grow at least so.
+constexpr double kHighGrowth = 1;
 // Filtered leapfrog is for errors from this share of the size on; its trials may cost so much of velocity Verlet's run.
 constexpr double kFilteredFrom = 3e-4, kFilteredBudget = 0.35, kQuietBudget = 0.08;
 // Methods that are stable at any step are for errors from this share of the size on, and for at most this share of
@@ -51,6 +72,12 @@ constexpr double kCoarseGrowth = 2;
 constexpr double kMostlyDamped = 1.3;
 // One step a tick of theirs so many times cheaper than velocity Verlet is tried before anything else.
 constexpr double kCoarseEarly = 16;
+// XPBD on a body near rest: it has swung out after so many steps, mostly; its run may cost this share of velocity
+// Verlet's and its trial that one; its swing is known to this factor.
+constexpr double kSwingSteps = 48, kSwingBudget = 0.5, kSwingTrial = 0.4, kSwingSafety = 1.25;
+// A body is near rest where its motion stays below the last share of the wanted error; below the first one that is seen
+// at once. Its fast part goes on growing at most as this power of time.
+constexpr double kAtRest = 0.1, kNearRest = 0.5, kRestDoubt = 0.25, kRestGrowth = 0.75;
 // A step of backward Euler costs as much as so many evaluations of the forces at the least.
 constexpr double kLeastEvaluations = 10;
 // Of the rejected ones so many are told in words, those first that cost the least more.
@@ -129,10 +156,10 @@ class Trial {
   std::vector<double> speeds_;
 };
 
-// The most that two runs differ up to a tick; infinite where one of them failed.
-double difference(const Trial& a, const Trial& b, Index tick, Index stride) {
+// The most that two runs differ after tick `from` and up to another; infinite where one of them failed.
+double difference(const Trial& a, const Trial& b, Index tick, Index stride, Index from = 0) {
   double most = 0;
-  for (std::size_t i = 0; i < std::size_t(tick / stride); ++i) {
+  for (std::size_t i = std::size_t(from / stride); i < std::size_t(tick / stride); ++i) {
     if (i >= a.states().size() || i >= b.states().size()) return kInfinity;
     const double now = rms(a.states()[i], b.states()[i]);
     if (!std::isfinite(now)) return kInfinity;
@@ -141,16 +168,27 @@ double difference(const Trial& a, const Trial& b, Index tick, Index stride) {
   return most;
 }
 
-// What an error that was seen up to a share of the run becomes at its end.
+// An error that was seen up to a share of the run.
+struct Seen {
+  double error, share;
+};
+
+// The powers of time that an error may grow with.
+struct Growth {
+  double least, most = kMostGrowth, doubt = kDoubt;
+};
+
+// What an error that was seen becomes at the end of the run.
 struct Forecast {
   double low = 0, likely = 0, high = 0;
 
-  Forecast(double seen, double seen_at_half, double share, double least) {
-    const double slope = seen_at_half > 0 && std::isfinite(seen) ? std::log2(seen / seen_at_half) : 1;
-    const double power = std::clamp(slope, least, kMostGrowth);
-    likely = seen * std::pow(1 / share, power);
-    low = seen * std::pow(1 / share, std::max(least, power - kDoubt));
-    high = likely * std::pow(1 / share, kDoubt);
+  Forecast(Seen before, Seen now, Growth growth) {
+    const bool shows = before.error > 0 && std::isfinite(now.error) && before.share < now.share;
+    const double slope = shows ? std::log(now.error / before.error) / std::log(now.share / before.share) : 1;
+    const double power = std::clamp(slope, growth.least, growth.most);
+    likely = now.error * std::pow(1 / now.share, power);
+    low = now.error * std::pow(1 / now.share, std::max(growth.least, power - growth.doubt));
+    high = likely * std::pow(1 / now.share, growth.doubt);
   }
 };
 
@@ -217,19 +255,23 @@ class Chooser {
     out.precision = precision;
     out.substeps = steps;
     out.evaluations = evaluations_of(method, double(ticks_), double(steps));
-    const bool in_double = rounding_shows(settings_, tick_ / double(steps), speed_, run_.gravity.norm(), limit(method));
-    out.seconds = cost_.seconds(method, precision, out.evaluations, in_double);
+    out.seconds = cost_.seconds(method, precision, out.evaluations, in_double(out));
     return out;
+  }
+
+  // Whether float would be stepped in double.
+  bool in_double(const Candidate& c) const {
+    return rounding_shows(settings_, tick_ / double(c.substeps), speed_, run_.gravity.norm(), limit(*c.method));
   }
 
   // Its rounding alone, at the end of the run.
   double floor_of(const Candidate& c) const {
     const double stages = c.method == &velocity_verlet() ? 1 : 2;
     const double share = c.precision == Precision::Float ? kFloatFloor : kFloatFloor * 2e-9;
-    // A chain has no neighbours that even out its rounding.
     const double springs = settings_.network ? double(settings_.network->springs.size()) : 0;
-    const double alone = springs < 1.5 * double(settings_.positions.rows()) ? 10 : 1;
-    return alone * share * choice_.size * std::sqrt(stages * double(ticks_) * double(c.substeps));
+    const bool chain = springs < 1.5 * double(settings_.positions.rows());
+    const double times = !highest_ ? kDampedFloor : in_double(c) ? kFineFloor : chain ? kChainFloor : 1;
+    return times * share * choice_.size * std::sqrt(stages * double(ticks_) * double(c.substeps));
   }
 
   std::unique_ptr<Trial> trial(const Candidate& c) const {
@@ -323,6 +365,7 @@ class Chooser {
     share_ = share;
     for (int i : {0, 1})
       if (pair_[i]->done() < tick_of(share)) reach(*pair_[i], pair_candidate_[i], tick_of(share));
+    look_at_motion();
     // Speeds grow at most as in a fall.
     const std::vector<double>& speeds = pair_[1]->speeds();
     const std::size_t n = std::size_t(tick_of(share) / stride_);
@@ -332,23 +375,51 @@ class Chooser {
     speed_ = now * std::pow(std::max(1.0, 0.6 / shown(share)), power);
   }
 
+  // What the pair's share tells of the motion.
+  void look_at_motion() {
+    const Index until = tick_of(share_);
+    double first = 0, all = 0;
+    for (Index i = 1; i <= std::min(until / stride_, Index(pair_[1]->states().size())); ++i) {
+      all = std::max(all, moved(*pair_[1], i));
+      if (2 * i * stride_ <= until) first = all;
+    }
+    motion_growth_ = first > 0 ? std::log2(all / first) : kMostGrowth;
+    calm_ = all <= kCalmMore * first && all <= kCalmMost * choice_.size;
+    rough_ = difference(*pair_[0], *pair_[1], until, stride_) > kRough * all;
+    safety_ = !calm_ ? kSafety : rough_ ? kRoughSafety : kCalmSafety;
+  }
+
+  // How far the points are from the start in the trial's kept state i, from 1 on.
+  double moved(const Trial& t, Index i) const { return rms(t.states()[std::size_t(i - 1)], settings_.positions); }
+
+  // Where dampers take from a calm motion, what has faded counts no more.
+  bool fades() const { return !highest_ && calm_; }
+  Index since(double share) const {
+    return fades() && tick_of(share) > stride_ ? tick_of(share) / 2 / stride_ * stride_ : 0;
+  }
+
   double pair_ratio() const { return double(pair_candidate_[1].substeps) / double(pair_candidate_[0].substeps); }
 
   // Error at the limit as the pair tells it. Where it is not more than rounding, of which the finer one has more, it is
   // as much as that.
   double pair_error(double share) const {
-    const double seen = difference(*pair_[0], *pair_[1], tick_of(share), stride_);
+    const double seen = difference(*pair_[0], *pair_[1], tick_of(share), stride_, since(share));
     const double times = pair_ratio(), of_both = std::sqrt(1 + times);
     const double rounding = of_both * std::sqrt(shown(share)) * floor_of(pair_candidate_[0]);
-    return seen < 3 * rounding ? seen / of_both : kPairRough * seen / (1 - 1 / (times * times));
+    if (seen < 3 * rounding) return seen / of_both;
+    return rough_ ? kRoughPair * seen : seen / (1 - 1 / (times * times));
   }
 
-  // Dampers let errors settle; rounding adds up faster than it is seen to begin with.
   Forecast forecast() const {
-    const double seen = pair_error(share_);
-    const bool rounding = seen < 3 * std::sqrt(shown(share_)) * floor_of(pair_candidate_[0]);
-    const double least = rounding ? 0.75 : highest_ ? kLeastGrowth : 0.0;
-    return {seen, pair_error(share_ / 2), shown(share_), least};
+    const Seen now{pair_error(share_), shown(share_)};
+    Growth growth = rough_ ? Growth{kLeastRough, kMostRough}
+                           : Growth{kLeastSmooth, std::min(kMostGrowth, kDriftGrowth + motion_growth_)};
+    growth.doubt = calm_ ? kCalmDoubt : kDoubt;
+    if (now.error < 3 * std::sqrt(now.share) * floor_of(pair_candidate_[0]))
+      growth.least = kLeastRounding, growth.most = std::max(growth.most, kLeastRounding);
+    else if (!highest_)
+      growth.least = fades() ? -kMostFading : 0;
+    return {{pair_error(share_ / 2), shown(share_ / 2)}, now, growth};
   }
 
   void look_at_velocity_verlet() {
@@ -372,6 +443,7 @@ class Chooser {
           format("seen over the first %.3g of the run, velocity Verlet at its stability limit errs by %s %.1e m",
                  shown(share_), how, error);
     };
+    if (near_rest_does()) return;
     // Where coarse steps cost a small share of it, they are tried early: the pair would cost more than they do.
     if (kCoarseEarly * with_steps(xpbd(), Precision::Float, 1).seconds < base.seconds &&
         wanted_ >= kCoarseFrom * choice_.size) {
@@ -382,12 +454,12 @@ class Chooser {
       if (share < 1.0 / 4 && tick_of(share) == tick_of(share / 2)) continue;  // growth would not show
       extend_pair(share);
       const Forecast now = forecast();
-      if (kSafety * now.high <= wanted_) return enough(now.high, "less than");
+      if (safety_ * now.high <= wanted_) return enough(now.high, "less than");
       // Clearly not: what comes is dearer and looked at in its own way.
       if (!(now.low <= 2 * wanted_)) break;
     }
     const Forecast now = forecast();
-    if (kSafety * now.likely <= wanted_) return enough(now.likely, "about");
+    if (safety_ * now.likely <= wanted_) return enough(now.likely, "about");
     refine(now);
   }
 
@@ -398,8 +470,9 @@ class Chooser {
     const auto euler = trial(c);
     reach(*euler, c, tick_of(share_));
     const auto seen = [&](double share) { return difference(*euler, *pair_[1], tick_of(share), stride_); };
-    const Forecast error(seen(share_), seen(share_ / 2), shown(share_), highest_ ? kLeastGrowth : 0.0);
-    if (kSafety * error.high <= wanted_) consider(c, std::max(error.likely, floor_of(c)));
+    const Forecast error({seen(share_ / 2), shown(share_ / 2)}, {seen(share_), shown(share_)},
+                         {highest_ ? kLeastGrowth : 0.0});
+    if (safety_ * error.high <= wanted_) consider(c, std::max(error.likely, floor_of(c)));
   }
 
   // Methods that are stable at any step. True where one of them does.
@@ -427,7 +500,12 @@ class Chooser {
       double before = kInfinity;
       for (Index steps = 1;; steps *= 2) {
         Candidate c = with_steps(method, Precision::Float, steps);
-        if (is_implicit(method)) c.seconds *= kLeastEvaluations;
+        if (is_implicit(method)) {
+          if (!implicit_cost_) implicit_cost_.emplace(settings_);
+          const double all = double(ticks_) * double(steps);
+          c.seconds =
+              std::max(kLeastEvaluations * c.seconds, implicit_cost_->seconds(c.precision, 2 * all, 2 * all, all));
+        }
         if (c.seconds > most) return;
         const auto now = trial(c);
         // First a little: an implicit method's cost is known once it has run.
@@ -438,8 +516,9 @@ class Chooser {
           if (pair_[0]->done() < judged) reach(*pair_[0], pair_candidate_[0], judged);
           if (!reach_coarse(*now, c, judged, most)) return;
           seen = difference(*now, *pair_[0], judged, stride_);
-          const double half = difference(*now, *pair_[0], std::max(stride_, judged / 2), stride_);
-          const double error = Forecast(seen, half, share, kCoarseGrowth).likely;
+          const Index half = std::max(stride_, judged / 2 / stride_ * stride_);
+          const Seen before_that{difference(*now, *pair_[0], half, stride_), double(half) / double(ticks_)};
+          const double error = Forecast(before_that, {seen, share}, {kCoarseGrowth}).likely;
           if (kCoarseSafety * error <= wanted_) {
             consider(c, std::max(error, floor_of(c)));
             choice_.reason =
@@ -456,6 +535,51 @@ class Chooser {
     } catch (const std::exception&) {
       // It does not take this body.
     }
+  }
+
+  // A body that hardly moves: XPBD errs by what its few sweeps leave undone, and that is a swing of its own, whose
+  // width falls as the square of the step and whose turn comes after so many steps. One coarse run over the whole time
+  // shows it, and whatever moves slowly; what moves fast is seen in the first ticks of velocity Verlet's trial.
+  bool near_rest_does() {
+    if (wanted_ < kCoarseFrom * choice_.size) return false;
+    Index steps = std::max<Index>(1, Index(std::ceil(kSwingSteps / double(ticks_))));
+    const auto with = [&](Index n) { return with_steps(xpbd(), Precision::Float, n); };
+    if (with(steps).seconds > kSwingTrial * base_.seconds) return false;
+    double before = 0, fast = kInfinity;
+    for (Index i = 1; i <= 2 && i * stride_ <= ticks_; ++i) {
+      reach(*pair_[0], pair_candidate_[0], i * stride_);
+      if (pair_[0]->done() < i * stride_) return false;
+      const double now = std::max(before, moved(*pair_[0], i));
+      const double growth = i == 1 ? kRestGrowth : std::clamp(std::log2(now / before), 0.0, 2.0) + kRestDoubt;
+      fast = now > 0 ? now * std::pow(double(ticks_) / double(i * stride_), growth) : 0;
+      if (fast <= kAtRest * wanted_ || now > kNearRest * wanted_) break;
+      before = now;
+    }
+    if (!(fast <= kNearRest * wanted_)) return false;
+    const double room = (wanted_ - fast) / kSwingSafety;
+    for (; with(steps).seconds <= kSwingTrial * base_.seconds; steps *= 2) {
+      const Candidate c = with(steps);
+      const auto now = trial(c);
+      double most = 0, finer = 0;
+      Index turn = 0;
+      for (Index i = 1; i <= ticks_ / stride_; ++i) {
+        reach(*now, c, i * stride_);
+        if (now->done() < i * stride_) return false;
+        if (const double swing = moved(*now, i); swing > most) most = swing, turn = i;
+        // It takes at least so many times the steps.
+        finer = std::sqrt(most / room);
+        if (!(finer * c.seconds <= kSwingBudget * base_.seconds)) return false;
+      }
+      if (finer > 1 && 4 * turn > 3 * (ticks_ / stride_)) continue;  // it may swing farther
+      const Candidate best = with(std::max<Index>(1, Index(std::ceil(double(steps) * finer))));
+      if (best.seconds > kSwingBudget * base_.seconds) return false;
+      const double times = double(steps) / double(best.substeps);
+      consider(best, std::max(fast + most * times * times, floor_of(best)));
+      choice_.reason = format("the body stays within %.1e m, and XPBD within %.1e m of it with %ld step%s a tick", fast,
+                              most, long(steps), steps == 1 ? "" : "s");
+      return true;
+    }
+    return false;
   }
 
   // Runs it on, counts its work, and tells whether it got there within `most` seconds for the whole run.
@@ -480,11 +604,10 @@ class Chooser {
   // Velocity Verlet at its limit is not enough.
   void refine(Forecast seen) {
     const Precision precision = pair_candidate_[0].precision;
-    if (share_ >= 0.25 && kSafety * seen.likely <= 2 * wanted_) {
-      // At order 1 the pair tells two thirds of the error.
-      const double by_order = 1.5 * kSafety * seen.likely / wanted_;
-      Candidate c = candidate(velocity_verlet(), precision, std::sqrt(by_order));
-      consider(c, std::max(wanted_ / kSafety, floor_of(c)));
+    if (share_ >= 0.25 && safety_ * seen.likely <= 2 * wanted_) {
+      // A little more, as its order may be less than 2.
+      const Candidate c = candidate(velocity_verlet(), precision, std::sqrt(1.1 * safety_ * seen.likely / wanted_));
+      consider(c, std::max(wanted_ / safety_, floor_of(c)));
       choice_.reason =
           format("seen over the first %.3g of the run, velocity Verlet at its stability limit errs by about %.1e m",
                  shown(share_), seen.likely);
@@ -495,7 +618,7 @@ class Chooser {
       seen = forecast();
     }
     // Where what is needed costs several times more, the growth of errors is looked at to the end.
-    const double finer = std::min(3.0, std::sqrt(kSafety * seen.likely / wanted_));
+    const double finer = std::min(3.0, std::sqrt(safety_ * seen.likely / wanted_));
     const double needed =
         std::min(candidate(velocity_verlet(), precision, finer).seconds, candidate(*high_, precision, 1).seconds);
     const double rest = (1 - shown(share_)) * (pair_candidate_[0].seconds + pair_candidate_[1].seconds);
@@ -505,7 +628,7 @@ class Chooser {
     // The next order as judge of both, over a first part.
     const double part = kJudgedShare;
     const double here = pair_error(part);
-    const double growth = here > 0 && std::isfinite(whole) ? std::max(1.0, whole / here) : 1;
+    const double growth = here > 0 && std::isfinite(whole) ? std::max(fades() ? 0.0 : 1.0, whole / here) : 1;
     // In float the differences would be its rounding.
     const Precision judging = wanted_ < 30 * floor_of(base_) ? Precision::Double : precision;
     const auto run = [&](const Method& method, double times) {
@@ -514,42 +637,45 @@ class Chooser {
       reach(*out, c, tick_of(part));
       return out;
     };
-    const auto between = [&](const Trial& a, const Trial& b) { return difference(a, b, tick_of(part), stride_); };
+    const auto between = [&](const Trial& a, const Trial& b) {
+      return difference(a, b, tick_of(part), stride_, since(part));
+    };
     const auto judge = run(*high_, 1);
-    const double e1 = between(*pair_[0], *judge), e2 = between(*pair_[1], *judge);
+    // RK4 at its limit errs nearly as much as velocity Verlet does.
+    const auto finer_judge = highest_ ? nullptr : run(*high_, 2);
+    const Trial& best_known = finer_judge ? *finer_judge : *judge;
+    const double e1 = between(*pair_[0], best_known), e2 = between(*pair_[1], best_known);
     const double order =
         e2 > 0 && std::isfinite(e1) ? std::clamp(std::log(e1 / e2) / std::log(pair_ratio()), 0.5, 2.0) : 2;
     // A judge that is seen to differ by more than that from the pair may be the worse one.
     const double error = std::min(e1, kMostJudged * here) * growth;
-    add_finer(velocity_verlet(), error, order, kSafety, 8);
+    add_finer(velocity_verlet(), error, order, safety_, 8);
 
-    // Its own error: first by a rule that holds for rough and smooth motion alike, then seen.
+    // Its own error: first by a rule, then seen. It sits in the fastest modes, which dampers take first.
     const bool smooth = order > 1.7;
-    double high_order = smooth ? 3.5 : 2 * order;
-    double high_error = error / 16;
-    // The order of a method whose error at the limit is known from a trial with twice the steps, where it would take
-    // more than those: then it is worth a look.
-    const auto own_order = [&](const Method& method, const Trial& twice, double seen_error, double by_rule,
-                               double most) {
-      const bool wanted = kHighSafety * seen_error > std::pow(2.0, by_rule) * wanted_;
-      if (!wanted || !std::isfinite(seen_error) || by_rule >= most) return by_rule;
-      const double next = between(twice, *run(method, 4)) * growth;
-      return next > 0 && std::isfinite(next) ? std::clamp(std::log2(seen_error / next), by_rule, most) : by_rule;
-    };
-    if (!highest_ || !(kHighSafety * high_error <= wanted_)) {
-      const auto better = highest_ ? run(*highest_, 1) : run(*high_, 2);
-      high_error = between(*judge, *better) * growth;
-      if (highest_) {
-        double highest_error = high_error / 4, highest_order = smooth ? 5 : high_order;
-        if (!(kHighSafety * high_error / std::pow(2.6, high_order) <= wanted_)) {
-          const auto best = run(*highest_, 2);
-          highest_error = between(*better, *best) * growth;
-          highest_order = own_order(*highest_, *best, highest_error, highest_order, 5);
+    const double high_growth = highest_ ? std::max(growth, std::pow(1 / shown(part), kHighGrowth))
+                               : calm_  ? std::min(growth, 1.0)
+                                        : growth;
+    double high_order = !highest_ ? (smooth ? kDampedHigh : kDampedRoughHigh)
+                        : smooth  ? 3.5
+                                  : std::max(kRoughHigh, 2 * order);
+    double high_error = error / (order > 1.95 ? kHighBetterSmooth : kHighBetter);
+    if (!highest_) {
+      high_error = between(*judge, *finer_judge) * high_growth;
+    } else if (!(kHighSafety * high_error <= wanted_)) {
+      const auto better = run(*highest_, 1);
+      high_error = between(*judge, *better) * high_growth;
+      double highest_error = high_error / 4, highest_order = smooth ? 5 : std::max(kRoughHighest, high_order);
+      if (!(kHighSafety * high_error / std::pow(2.6, high_order) <= wanted_)) {
+        const auto best = run(*highest_, 2);
+        highest_error = between(*better, *best) * high_growth;
+        // Where it would take more than these steps its order is worth a look.
+        if (highest_order < 5 && kHighSafety * highest_error > std::pow(2.0, highest_order) * wanted_) {
+          const double next = between(*best, *run(*highest_, 4)) * high_growth;
+          if (next > 0) highest_order = std::clamp(std::log2(highest_error / next), highest_order, 5.0);
         }
-        add_finer(*highest_, highest_error, highest_order, kHighSafety, 8);
-      } else {
-        high_order = own_order(*high_, *better, high_error, high_order, 3.5);
       }
+      add_finer(*highest_, highest_error, highest_order, kHighSafety, 8);
     }
     add_finer(*high_, high_error, high_order, kHighSafety, 8);
     choice_.reason =
@@ -608,6 +734,9 @@ class Chooser {
   Candidate base_, pair_candidate_[2];
   std::unique_ptr<Trial> pair_[2];
   double share_ = 0;
+  double motion_growth_ = kMostGrowth;  // the power of time that displacements grow with
+  bool calm_ = false, rough_ = false;
+  double safety_ = kSafety;
   bool steps_in_double_ = false, tried_coarse_ = false;
   std::vector<Candidate> considered_;
   SolverChoice choice_;
