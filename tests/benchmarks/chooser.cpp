@@ -4,8 +4,8 @@
 //   chooser_bench [--first SEED] [--scenes COUNT] [--work SECONDS] [--csv FILE]
 //
 // A fifth of the scenes is so stiff that velocity Verlet takes up to five times `work`, with coarse wanted errors.
-// What seeds the chooser was tuned on is told in docs/chooser.md. Costs are counted force evaluations times the chooser's cost table;
-// processor time is told beside them.
+// What seeds the chooser was tuned on is told in docs/chooser.md. Costs are counted force evaluations times the
+// chooser's cost table; processor time is told beside them.
 #include <hooke/softbody/choose_solver.hpp>
 #include <hooke/softbody/spring_field.hpp>
 #include <hooke/softbody/xpbd.hpp>

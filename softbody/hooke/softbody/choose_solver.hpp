@@ -52,9 +52,10 @@ struct SolverChoice : Candidate {
 /// Short trial runs at and below the stability limit of velocity Verlet are compared and their difference is
 /// extrapolated to the end of the run; for grids and coarse errors filtered leapfrog is refined from coarse steps.
 /// Methods of order 4 and 6 are tried where velocity Verlet would need much shorter steps, xpbd() and backward Euler
-/// where its stable step is so short that coarse steps of theirs cost much less. Everything is decided by
-/// counted operations and CostTable: the same arguments give the same choice on every machine whose arithmetic is
-/// IEEE's. Cost: about 0.1 to 0.8 of the run that it picks; told in the choice.
+/// where its stable step is so short that coarse steps of theirs cost much less, or where the body hardly moves.
+/// Everything is decided by counted operations and CostTable: the same arguments give the same choice on every machine
+/// whose arithmetic is IEEE's. Cost: about 0.1 to 0.8 of the run that it picks, more where that is a step or two a
+/// tick; told in the choice.
 /// @param settings `motion.method`, `motion.dt`, `precision` and `wanted_error` are not looked at
 /// @param wanted_error relative, > 0
 /// @throws std::invalid_argument for a wanted error, duration or rate that is not positive and finite, and as
