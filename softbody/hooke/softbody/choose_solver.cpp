@@ -72,12 +72,16 @@ constexpr double kCoarseGrowth = 2;
 constexpr double kMostlyDamped = 1.3;
 // One step a tick of theirs so many times cheaper than velocity Verlet is tried before anything else.
 constexpr double kCoarseEarly = 16;
-// XPBD on a body near rest: it has swung out after so many steps, mostly; its run may cost this share of velocity
-// Verlet's and its trial that one; its swing is known to this factor.
-constexpr double kSwingSteps = 48, kSwingBudget = 0.5, kSwingTrial = 0.4, kSwingSafety = 1.25;
-// A body is near rest where its motion stays below the last share of the wanted error; below the first one that is seen
-// at once. Its fast part goes on growing at most as this power of time.
-constexpr double kAtRest = 0.1, kNearRest = 0.5, kRestDoubt = 0.25, kRestGrowth = 0.75;
+// A body is near rest where its motion is foretold to stay below this share of the wanted error.
+constexpr double kNearRest = 0.5;
+// Seen in one kept state that motion is taken to grow as this power of time, and must stay below this share; in two it
+// grows as the power that they show and this doubt.
+constexpr double kRestGrowth = 0.75, kAtRest = 0.1, kRestDoubt = 0.25;
+// XPBD's swing there has mostly turned after so many steps. It is known to the first factor where steps are at most so
+// many times shorter than those it was seen with.
+constexpr double kSwingSteps = 48, kSwingSafety = 1.25, kSwingFiner = 8;
+// The run may cost this share of velocity Verlet's, and the trials that one.
+constexpr double kSwingBudget = 0.5, kSwingTrial = 0.4;
 // A step of backward Euler costs as much as so many evaluations of the forces at the least.
 constexpr double kLeastEvaluations = 10;
 // Of the rejected ones so many are told in words, those first that cost the least more.
@@ -128,6 +132,7 @@ class Trial {
     for (const Collider& collider : run.colliders) world_.add_collider(collider);
     body_ = &world_.add(make_soft_body(settings));
     if (run.prepare) run.prepare(*body_);
+    start_ = body_->positions();
   }
 
   /// Goes on to this tick, or to the one that fails.
@@ -144,6 +149,8 @@ class Trial {
   Index done() const { return done_; }
   const std::vector<Points<double>>& states() const { return states_; }
   Points<double> positions() const { return body_->positions(); }
+  /// RMS way of the points from their places at the start to those in kept state i, from 1 on [m].
+  double moved(Index i) const { return rms(states_[std::size_t(i - 1)], start_); }
   const std::vector<double>& speeds() const { return speeds_; }  // RMS over points, beside the states [m/s]
   MotionFacts facts() const { return body_->motion_facts(); }
 
@@ -152,6 +159,7 @@ class Trial {
   Body* body_ = nullptr;
   Index stride_, done_ = 0;
   bool good_ = true;
+  Points<double> start_{0, 3};
   std::vector<Points<double>> states_;
   std::vector<double> speeds_;
 };
@@ -270,7 +278,8 @@ class Chooser {
     const double share = c.precision == Precision::Float ? kFloatFloor : kFloatFloor * 2e-9;
     const double springs = settings_.network ? double(settings_.network->springs.size()) : 0;
     const bool chain = springs < 1.5 * double(settings_.positions.rows());
-    const double times = !highest_ ? kDampedFloor : in_double(c) ? kFineFloor : chain ? kChainFloor : 1;
+    const bool fused = std::holds_alternative<Splitting>(c.method->scheme) && run_.colliders.empty() && !run_.prepare;
+    const double times = !highest_ ? kDampedFloor : fused && in_double(c) ? kFineFloor : chain ? kChainFloor : 1;
     return times * share * choice_.size * std::sqrt(stages * double(ticks_) * double(c.substeps));
   }
 
@@ -377,20 +386,17 @@ class Chooser {
 
   // What the pair's share tells of the motion.
   void look_at_motion() {
-    const Index until = tick_of(share_);
+    const Index until = tick_of(share_), states = until / stride_, half = states / 2;
     double first = 0, all = 0;
-    for (Index i = 1; i <= std::min(until / stride_, Index(pair_[1]->states().size())); ++i) {
-      all = std::max(all, moved(*pair_[1], i));
-      if (2 * i * stride_ <= until) first = all;
+    for (Index i = 1; i <= std::min(states, Index(pair_[1]->states().size())); ++i) {
+      all = std::max(all, pair_[1]->moved(i));
+      if (i <= half) first = all;
     }
-    motion_growth_ = first > 0 ? std::log2(all / first) : kMostGrowth;
+    motion_growth_ = first > 0 ? std::log(all / first) / std::log(double(states) / double(half)) : kMostGrowth;
     calm_ = all <= kCalmMore * first && all <= kCalmMost * choice_.size;
     rough_ = difference(*pair_[0], *pair_[1], until, stride_) > kRough * all;
     safety_ = !calm_ ? kSafety : rough_ ? kRoughSafety : kCalmSafety;
   }
-
-  // How far the points are from the start in the trial's kept state i, from 1 on.
-  double moved(const Trial& t, Index i) const { return rms(t.states()[std::size_t(i - 1)], settings_.positions); }
 
   // Where dampers take from a calm motion, what has faded counts no more.
   bool fades() const { return !highest_ && calm_; }
@@ -539,45 +545,62 @@ class Chooser {
 
   // A body that hardly moves: XPBD errs by what its few sweeps leave undone, and that is a swing of its own, whose
   // width falls as the square of the step and whose turn comes after so many steps. One coarse run over the whole time
-  // shows it, and whatever moves slowly; what moves fast is seen in the first ticks of velocity Verlet's trial.
+  // shows it, together with whatever else moves.
   bool near_rest_does() {
+    const Index states = ticks_ / stride_;
     if (wanted_ < kCoarseFrom * choice_.size) return false;
     Index steps = std::max<Index>(1, Index(std::ceil(kSwingSteps / double(ticks_))));
     const auto with = [&](Index n) { return with_steps(xpbd(), Precision::Float, n); };
     if (with(steps).seconds > kSwingTrial * base_.seconds) return false;
-    double before = 0, fast = kInfinity;
-    for (Index i = 1; i <= 2 && i * stride_ <= ticks_; ++i) {
-      reach(*pair_[0], pair_candidate_[0], i * stride_);
-      if (pair_[0]->done() < i * stride_) return false;
-      const double now = std::max(before, moved(*pair_[0], i));
-      const double growth = i == 1 ? kRestGrowth : std::clamp(std::log2(now / before), 0.0, 2.0) + kRestDoubt;
-      fast = now > 0 ? now * std::pow(double(ticks_) / double(i * stride_), growth) : 0;
-      if (fast <= kAtRest * wanted_ || now > kNearRest * wanted_) break;
-      before = now;
+    // How the body moves at all.
+    Index looked = 0;
+    double seen = 0, moves = kInfinity;
+    while (looked < std::min<Index>(2, states)) {
+      ++looked;
+      reach(*pair_[0], pair_candidate_[0], looked * stride_);
+      if (pair_[0]->done() < looked * stride_) return false;
+      const double now = std::max(seen, pair_[0]->moved(looked));
+      const double growth =
+          looked == 1 || seen == 0 ? kRestGrowth : std::clamp(std::log2(now / seen), 0.0, 2.0) + kRestDoubt;
+      moves = now * std::pow(double(states) / double(looked), growth);
+      seen = now;
+      if (moves <= kAtRest * wanted_ || seen > kNearRest * wanted_) break;
     }
-    if (!(fast <= kNearRest * wanted_)) return false;
-    const double room = (wanted_ - fast) / kSwingSafety;
-    for (; with(steps).seconds <= kSwingTrial * base_.seconds; steps *= 2) {
-      const Candidate c = with(steps);
-      const auto now = trial(c);
-      double most = 0, finer = 0;
-      Index turn = 0;
-      for (Index i = 1; i <= ticks_ / stride_; ++i) {
-        reach(*now, c, i * stride_);
-        if (now->done() < i * stride_) return false;
-        if (const double swing = moved(*now, i); swing > most) most = swing, turn = i;
-        // It takes at least so many times the steps.
-        finer = std::sqrt(most / room);
-        if (!(finer * c.seconds <= kSwingBudget * base_.seconds)) return false;
+    if (!(moves <= kNearRest * wanted_)) return false;
+    const double room = (wanted_ - moves) / kSwingSafety;
+    // What is only to come falls with no square of a step.
+    const bool left_alone = run_.colliders.empty() && !run_.prepare && !settings_.wind;
+    try {
+      double left = kSwingTrial * base_.seconds;
+      for (; with(steps).seconds <= left; steps *= 2) {
+        const Candidate c = with(steps);
+        left -= c.seconds;
+        const auto now = trial(c);
+        double most = 0, finer = 0;
+        Index turn = 0;
+        for (Index i = 1; i <= states; ++i) {
+          reach(*now, c, i * stride_);
+          if (now->done() < i * stride_) return false;
+          if (const double swing = now->moved(i); swing > most) most = swing, turn = i;
+          // It takes at least so many times the steps.
+          finer = std::sqrt(most / room);
+          if (!(finer * c.seconds <= kSwingBudget * base_.seconds) || (finer > 1 && !left_alone)) return false;
+        }
+        // Of what it shows so much may be no swing, but a motion that velocity Verlet sees begin as well.
+        const double begun = now->moved(looked), real = begun > 0 ? most * std::min(1.0, seen / begun) : 0;
+        if (finer > 1 && real > room) return false;
+        if (finer > kSwingFiner || (finer > 1 && 4 * turn > 3 * states)) continue;  // it may swing farther
+        const Candidate best = with(std::max<Index>(1, Index(std::ceil(double(steps) * finer))));
+        const double times = double(steps) / double(best.substeps);
+        const double error = std::max(moves + most * times * times, floor_of(best));
+        if (best.seconds > kSwingBudget * base_.seconds || error > wanted_) return false;
+        consider(best, error);
+        choice_.reason = format("the body stays within %.1e m, and XPBD within %.1e m with %ld step%s a tick", moves,
+                                most, long(steps), steps == 1 ? "" : "s");
+        return true;
       }
-      if (finer > 1 && 4 * turn > 3 * (ticks_ / stride_)) continue;  // it may swing farther
-      const Candidate best = with(std::max<Index>(1, Index(std::ceil(double(steps) * finer))));
-      if (best.seconds > kSwingBudget * base_.seconds) return false;
-      const double times = double(steps) / double(best.substeps);
-      consider(best, std::max(fast + most * times * times, floor_of(best)));
-      choice_.reason = format("the body stays within %.1e m, and XPBD within %.1e m of it with %ld step%s a tick", fast,
-                              most, long(steps), steps == 1 ? "" : "s");
-      return true;
+    } catch (const std::exception&) {
+      // It does not take this body.
     }
     return false;
   }
@@ -591,7 +614,6 @@ class Chooser {
     if (is_implicit(*c.method) && t.done() > 0) {
       const MotionFacts facts = t.facts();
       c.evaluations = double(facts.evaluations) / done;
-      if (!implicit_cost_) implicit_cost_.emplace(settings_);
       c.seconds = implicit_cost_->seconds(c.precision, c.evaluations, double(facts.products) / done,
                                           double(ticks_) * double(c.substeps));
     }
@@ -670,9 +692,11 @@ class Chooser {
         const auto best = run(*highest_, 2);
         highest_error = between(*better, *best) * high_growth;
         // Where it would take more than these steps its order is worth a look.
-        if (highest_order < 5 && kHighSafety * highest_error > std::pow(2.0, highest_order) * wanted_) {
+        if (highest_order < 5 && std::isfinite(highest_error) &&
+            kHighSafety * highest_error > std::pow(2.0, highest_order) * wanted_) {
           const double next = between(*best, *run(*highest_, 4)) * high_growth;
-          if (next > 0) highest_order = std::clamp(std::log2(highest_error / next), highest_order, 5.0);
+          if (next > 0 && std::isfinite(next))
+            highest_order = std::clamp(std::log2(highest_error / next), highest_order, 5.0);
         }
       }
       add_finer(*highest_, highest_error, highest_order, kHighSafety, 8);

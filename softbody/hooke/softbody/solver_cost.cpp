@@ -31,6 +31,7 @@ const CostTable& fused_cost(const SoftBodySettings& s) {
 
 // Whether the fused kernels can run it.
 bool springs_alone(const SoftBodySettings& s) {
+  if (s.volume_stiffness != 0 || s.cell_stiffness != 0) return false;
   if (s.linear_drag != 0 || s.quadratic_drag != 0 || (s.wind && !s.wind->once_a_tick)) return false;
   return !s.network || std::none_of(s.network->springs.begin(), s.network->springs.end(),
                                     [](const Spring& spring) { return spring.damping > 0; });

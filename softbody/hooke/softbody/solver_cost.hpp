@@ -5,7 +5,7 @@
 
 namespace hooke::softbody {
 
-/// Nanoseconds of one force evaluation per spring, the step included; fixed, so that one scene gives one
+/// Nanoseconds of one force evaluation per spring or point, the step included; fixed, so that one scene gives one
 /// choice on every machine. Only their ratios decide.
 struct CostTable {
   double single, twice;  ///< float, double
@@ -23,7 +23,7 @@ inline constexpr CostTable kProductCost{20, 22};     ///< a product of an implic
 /// @param stable_step the method's largest [s]; 0: not looked at
 bool rounding_shows(const SoftBodySettings& settings, double h, double speed, double gravity, double stable_step = 0);
 
-/// What explicit methods and xpbd() cost on a body by the table.
+/// What explicit methods and xpbd() cost on a body by the table; of implicit ones the evaluations alone (ImplicitCost).
 class SolverCost {
  public:
   /// Cost: that of looking for rows in the springs.
