@@ -101,6 +101,12 @@ RunSetting half_a_second() {
   return run;
 }
 
+// What the choice really errs by.
+Verification truth_of(const SolverChoice& choice, SoftBodySettings body, const RunSetting& run) {
+  choice.apply(body);
+  return verify(body, run);
+}
+
 TEST(Chooser, PicksTheSameEveryTime) {
   const SoftBodySettings body = sheet(16);
   const SolverChoice a = choose_solver(body, half_a_second(), 1e-5);
@@ -124,9 +130,7 @@ TEST(Chooser, SmallerErrorsAreNeverCheaperAndAreMet) {
     EXPECT_GE(choice.seconds, cost) << wanted << ": " << choice.text();
     EXPECT_LE(choice.predicted_error, choice.wanted_error);
     cost = choice.seconds;
-    SoftBodySettings chosen = body;
-    choice.apply(chosen);
-    const Verification truth = verify(chosen, half_a_second());
+    const Verification truth = truth_of(choice, body, half_a_second());
     EXPECT_TRUE(truth.converged()) << wanted;
     EXPECT_LE(truth.error, choice.wanted_error) << choice.text();
   }
@@ -157,9 +161,7 @@ TEST(Chooser, GivesDampersToMethodsThatTakeThem) {
     const SolverChoice choice = choose_solver(sheet(12, 0.002), half_a_second(), wanted);
     EXPECT_TRUE(choice.method->accepts_velocity_forces) << choice.text();
     for (const Candidate& c : choice.rejected) EXPECT_TRUE(c.method->accepts_velocity_forces);
-    SoftBodySettings chosen = sheet(12, 0.002);
-    choice.apply(chosen);
-    const Verification truth = verify(chosen, half_a_second());
+    const Verification truth = truth_of(choice, sheet(12, 0.002), half_a_second());
     EXPECT_LE(truth.error, choice.wanted_error) << choice.text();
   }
 }
@@ -199,9 +201,7 @@ TEST(Chooser, TakesXpbdForABodyNearRest) {
     const double verlet =
         SolverCost(body).seconds(velocity_verlet(), Precision::Double, coarse_ticks().duration / step);
     EXPECT_LT(choice.pilot_seconds + choice.seconds, 0.25 * verlet) << choice.text();
-    SoftBodySettings chosen = body;
-    choice.apply(chosen);
-    const Verification truth = verify(chosen, coarse_ticks());
+    const Verification truth = truth_of(choice, body, coarse_ticks());
     EXPECT_TRUE(truth.converged());
     EXPECT_LE(truth.error, choice.wanted_error) << choice.text();
   }
@@ -224,9 +224,7 @@ TEST(Chooser, DoesNotTakeABodyForOneAtRestThatIsMovedLater) {
     });
   };
   const SolverChoice choice = choose_solver(body, run, 1e-2);
-  SoftBodySettings chosen = body;
-  choice.apply(chosen);
-  const Verification truth = verify(chosen, run);
+  const Verification truth = truth_of(choice, body, run);
   EXPECT_LE(truth.error, choice.wanted_error) << choice.text();
   EXPECT_THAT(choice.reason, ::testing::Not(::testing::HasSubstr("the body stays within")));
 }
@@ -253,9 +251,7 @@ TEST(Chooser, LooksAtShortRunsAndAtLongOnes) {
     for (const SoftBodySettings& body : {sheet(8), box(4, 3e6, 0), box(4, 1e4, 0.02, 0.05)}) {
       const SolverChoice choice = choose_solver(body, run, 1e-3);
       EXPECT_TRUE(choice.meets) << choice.text();
-      SoftBodySettings chosen = body;
-      choice.apply(chosen);
-      EXPECT_LE(verify(chosen, run).error, choice.wanted_error) << choice.text();
+      EXPECT_LE(truth_of(choice, body, run).error, choice.wanted_error) << choice.text();
     }
   }
 }
@@ -289,9 +285,7 @@ TEST(Chooser, ForetellsTheErrorOfRoughMotion) {
   const RunSetting run = coarse_ticks();
   const SolverChoice choice = choose_solver(body, run, 5e-3);
   ASSERT_EQ(choice.method, &velocity_verlet()) << choice.text();
-  SoftBodySettings chosen = body;
-  choice.apply(chosen);
-  const Verification truth = verify(chosen, run);
+  const Verification truth = truth_of(choice, body, run);
   EXPECT_TRUE(truth.converged());
   EXPECT_GT(choice.predicted_error, truth.error / 1.5) << choice.text();
   EXPECT_LT(choice.predicted_error, truth.error * 2) << choice.text();
@@ -303,9 +297,7 @@ TEST(Chooser, DoesNotLetErrorsOfHighOrdersGrowWhereDampersTakeThem) {
   const SoftBodySettings body = box(6, 1e4, 0.02, 0.05);
   const SolverChoice choice = choose_solver(body, half_a_second(), 1e-6);
   ASSERT_EQ(choice.method, &rk4()) << choice.text();
-  SoftBodySettings chosen = body;
-  choice.apply(chosen);
-  const Verification truth = verify(chosen, half_a_second());
+  const Verification truth = truth_of(choice, body, half_a_second());
   EXPECT_TRUE(truth.converged());
   EXPECT_LE(truth.error, choice.wanted_error) << choice.text();
   // And not at many times the steps that it takes.
@@ -334,9 +326,7 @@ TEST(Chooser, TakesBackwardEulerWhereDampersAreVeryStrong) {
   const SoftBodySettings body = stiff_chain(1e5, 1e4);
   const SolverChoice choice = choose_solver(body, coarse_ticks(), 1e-2);
   EXPECT_EQ(choice.method, &implicit_euler()) << choice.text();
-  SoftBodySettings chosen = body;
-  choice.apply(chosen);
-  const Verification truth = verify(chosen, coarse_ticks());
+  const Verification truth = truth_of(choice, body, coarse_ticks());
   EXPECT_TRUE(truth.converged());
   EXPECT_LE(truth.error, choice.wanted_error) << choice.text();
   const SolverChoice again = choose_solver(body, coarse_ticks(), 1e-2);

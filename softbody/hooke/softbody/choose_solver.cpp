@@ -34,12 +34,12 @@ constexpr double kRough = 0.03, kRoughPair = 1.25;
 // Motion is calm where it has turned, that is, its second half takes the points not much farther than the first one,
 // and where it is a small share of the size.
 constexpr double kCalmMore = 1.5, kCalmMost = 0.1;
-// Where it is not enough its growth is followed over the first share of the run at least, and errors of higher orders
-// are judged over the second.
+// Where the limit's step is not enough the growth of its error is followed over the first share of the run at least,
+// and errors of higher orders are judged over the second.
 constexpr double kPairShare = 1.0 / 8, kJudgedShare = 1.0 / 16;
 // The judge may find so many times the error that the pair tells: at order 0.5.
 constexpr double kMostJudged = 3;
-// At the limit order 4 errs so much less than order 2, where motion is smooth and where it is anything.
+// At the limit order 4 errs so much less than order 2, whatever the motion is, and where it is smooth.
 constexpr double kHighBetter = 16, kHighBetterSmooth = 100;
 // Orders that show at least where motion is rough, of the methods of order 4 and 6, and that of RK4 with dampers.
 constexpr double kRoughHigh = 2.2, kRoughHighest = 2.5, kDampedHigh = 3.7, kDampedRoughHigh = 3;
@@ -678,13 +678,12 @@ class Chooser {
     const double high_growth = highest_ ? std::max(growth, std::pow(1 / shown(part), kHighGrowth))
                                : calm_  ? std::min(growth, 1.0)
                                         : growth;
-    double high_order = !highest_ ? (smooth ? kDampedHigh : kDampedRoughHigh)
-                        : smooth  ? 3.5
-                                  : std::max(kRoughHigh, 2 * order);
-    double high_error = error / (order > 1.95 ? kHighBetterSmooth : kHighBetter);
-    if (!highest_) {
-      high_error = between(*judge, *finer_judge) * high_growth;
-    } else if (!(kHighSafety * high_error <= wanted_)) {
+    const double high_order = !highest_ ? (smooth ? kDampedHigh : kDampedRoughHigh)
+                              : smooth  ? 3.5
+                                        : std::max(kRoughHigh, 2 * order);
+    double high_error = !highest_ ? between(*judge, *finer_judge) * high_growth
+                                  : error / (order > 1.95 ? kHighBetterSmooth : kHighBetter);
+    if (highest_ && !(kHighSafety * high_error <= wanted_)) {
       const auto better = run(*highest_, 1);
       high_error = between(*judge, *better) * high_growth;
       double highest_error = high_error / 4, highest_order = smooth ? 5 : std::max(kRoughHighest, high_order);
